@@ -1,5 +1,5 @@
-//! In: a picture of 1280x1024 and a height map of 2000x2000 with one part among clutter, drawn here. Out: time of a full
-//! 360-degree search to the refined pose, and of the coarse search alone on the CPU and through the WGSL stages.
+//! In: a picture of 1280x1024 and a height map of 2000x2000 with one part among clutter, drawn here. Out: time of a
+//! full 360-degree search to the refined pose, and of the coarse search alone on the CPU and through the WGSL stages.
 //! Frame and unit: milliseconds; benches/peers/find.py measures OpenCV on the same input, which is left in
 //! target/find-bench with the size of the model.
 

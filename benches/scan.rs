@@ -1,5 +1,5 @@
-//! In: a recording and its station; simulated here where none are named. Out: wall and CPU time of decoding alone, of the GPU's
-//! chain alone and of a whole `sheetlight scan`, in turns, and the scan over what it cannot be faster than.
+//! In: a recording and its station; simulated here where none are named. Out: wall and CPU time of decoding alone, of
+//! the GPU's chain alone and of a whole `sheetlight scan`, in turns, and the scan over what it cannot be faster than.
 //! Frame and unit: seconds. `cargo bench --bench scan -- [RECORDING STATION] [ROUNDS]`
 
 mod common;

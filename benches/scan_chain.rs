@@ -1,6 +1,7 @@
-//! In: simulated pictures of every scene. Out: the chain of a scan, which learns the stripe from its first pictures, over the chain
-//! that `sheetlight bench` and the peers time, which is told it: points, wall and CPU time of both, in turns, on the processor and
-//! on the GPU. Frame and unit: ms a shot, shares. `cargo bench --bench scan_chain -- [WIDTHxHEIGHT]... [ROUNDS]`
+//! In: simulated pictures of every scene. Out: the chain of a scan, which learns the stripe from its first pictures,
+//! over the chain that `sheetlight bench` and the peers time, which is told it: points, wall and CPU time of both, in
+//! turns, on the processor and on the GPU. Frame and unit: ms a shot, shares.
+//! `cargo bench --bench scan_chain -- [WIDTHxHEIGHT]... [ROUNDS]`
 
 mod common;
 

@@ -270,7 +270,8 @@ scans: Array<string>,
  */
 recipe: string, 
 /**
- * Two places in the first scan's map, mm: the tool goes where the middle of the pins there says; null: where the recipe says.
+ * Two places in the first scan's map, mm: the tool goes where the middle of the pins there says; null: where the
+ * recipe says.
  */
 pins?: [[number, number], [number, number]] | null, };
 
@@ -750,7 +751,8 @@ dark: number,
  */
 right: boolean, 
 /**
- * The same in pieces along it, from the left or the top: peak, width in px, contrast, dark share; the first three are 0 where it is dark.
+ * The same in pieces along it, from the left or the top: peak, width in px, contrast, dark share; the first
+ * three are 0 where it is dark.
  */
 pieces: Array<[number, number, number, number]>, };
 
@@ -1374,8 +1376,9 @@ height: number,
  */
 corners: Array<[number, number]>, 
 /**
- * How far the board's normal leans away from the camera's axis, to the right and downwards in the picture, degrees, by the
- * station's camera or else one as long as its picture is wide; null where too little of the board was found.
+ * How far the board's normal leans away from the camera's axis, to the right and downwards in the picture,
+ * degrees, by the station's camera or else one as long as its picture is wide; null where too little of the
+ * board was found.
  */
 lean_deg: [number, number] | null, 
 /**
@@ -1883,7 +1886,8 @@ across_mm: number,
  */
 volume_mm: [number, number] | null, 
 /**
- * Left to the sides of the flange's box, mm; negative: outside; null: no box is stated or the robot's place is not known.
+ * Left to the sides of the flange's box, mm; negative: outside; null: no box is stated or the robot's place is
+ * not known.
  */
 box_mm: number | null, 
 /**
@@ -1895,7 +1899,8 @@ labels: Array<string>,
  */
 flange: Array<Array<number>>, 
 /**
- * What is swept, and how far a part in its middle reaches, in the camera's picture as it stands now, px; empty: not known.
+ * What is swept, and how far a part in its middle reaches, in the camera's picture as it stands now, px; empty:
+ * not known.
  */
 seen_px: Array<Array<[number, number]>>, 
 /**

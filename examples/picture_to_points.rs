@@ -1,5 +1,5 @@
-//! One picture of the stripe and a station in; the stripe's points out, as CSV: pixel, point, standard deviation. No robot: the
-//! points are in the camera's frame, mm.
+//! One picture of the stripe and a station in; the stripe's points out, as CSV: pixel, point, standard deviation. No
+//! robot: the points are in the camera's frame, mm.
 //!
 //!   cargo run --example picture_to_points -- PICTURE STATION
 

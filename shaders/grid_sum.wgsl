@@ -1,5 +1,5 @@
-// In: points of a cloud, the span of heights in each cell. Out: sums of the points below and above the middle of the span:
-// count, height, intensity, sigma. Twin and reasons: src/stages/grid.rs. Frame and unit: integer steps.
+// In: points of a cloud, the span of heights in each cell. Out: sums of the points below and above the middle of the
+// span: count, height, intensity, sigma. Twin and reasons: src/stages/grid.rs. Frame and unit: integer steps.
 @group(0) @binding(0) var<uniform> frame: GridFrame;
 @group(0) @binding(1) var<storage, read> records: array<u32>;
 @group(0) @binding(2) var<storage, read> span: array<vec2<u32>>;

@@ -1,6 +1,6 @@
-// In: pictures, skeleton, lit pixels. Out: the skeleton with its ends carried on while the light lasts. Twin and reasons:
-// src/stages/stripe/lines/lengthen.rs; here ends are found for 32 x 4 pixels at once. Frame and unit: pixels; brightness relative to the
-// end's own.
+// In: pictures, skeleton, lit pixels. Out: the skeleton with its ends carried on while the light lasts. Twin and
+// reasons: src/stages/stripe/lines/lengthen.rs; here ends are found for 32 x 4 pixels at once. Frame and unit:
+// pixels; brightness relative to the end's own.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 @group(0) @binding(2) var<storage, read> listing: array<u32>;
@@ -36,7 +36,8 @@ fn rows(own: vec4<u32>, left: vec4<u32>, right: vec4<u32>) -> Rows {
 
 // The pixels that have one neighbour, or two on one side: not more than two steps apart on the ring of eight.
 fn ends(above: Rows, r: Rows, below: Rows) -> vec4<u32> {
-    var ring = array<vec4<u32>, 8>(above.own, above.right, r.right, below.right, below.own, below.left, r.left, above.left);
+    var ring = array<vec4<u32>, 8>(above.own, above.right, r.right, below.right, below.own, below.left, r.left,
+        above.left);
     let beside = ((ring[0] & (ring[1] | ring[2])) | (ring[1] & (ring[2] | ring[3])))
         | ((ring[2] & (ring[3] | ring[4])) | (ring[3] & (ring[4] | ring[5])))
         | ((ring[4] & (ring[5] | ring[6])) | (ring[5] & (ring[6] | ring[7])))

@@ -1,7 +1,7 @@
-// In: the pictures of a batch and their skeleton pixels. Out: one peak a pixel, with the reason where it fails by itself; the
-// strongest of the others on each line across the stripe. Twin: src/stages/peak/fit.rs, across/centre.rs, across/direction.rs,
-// profile.rs, scoring.rs, methods.rs, stripe/choose.rs, where the reasons stand; docs/math.md, Stripe peak (0) to (5). Frame and unit:
-// pixels, grey levels.
+// Fits one peak at each skeleton pixel of a batch. A peak that fails a test of its own gets the reason for rejection.
+// Of the others the strongest on each line across the stripe is noted, for the comparison in point.wgsl. Units: pixels,
+// grey levels. Twin: src/stages/peak/fit.rs, across/centre.rs, across/direction.rs, profile.rs, scoring.rs,
+// methods.rs and stripe/choose.rs, which explains the reasons; docs/math.md, Stripe peak (0) to (5).
 @group(0) @binding(0) var<uniform> frame: PeakFrame;
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 @group(0) @binding(2) var<storage, read> header: array<u32>;
@@ -14,19 +14,19 @@ override px_log2: u32 = 2u;
 // 0 Gaussian, 1 centroid, 2 derivative, 3 the pixel itself.
 override peak_method: u32 = 0u;
 
-// Nearer than so many pixels lies a narrow stripe's own light.
+// Distance from the centre within which the light is a narrow stripe's own, px.
 const BESIDE = 4;
-// Of narrower stripes the skeleton is near enough to the middle, px.
+// The skeleton of a stripe narrower than this runs close enough to its middle, px.
 const BROAD = 4.5;
-// Variances of a pixel by as many pixels a side that two sides of one level differ by, squared.
+// Limit for the squared difference of two sides of one level, in variances of a pixel over the pixels of a side.
 const BY_NOISE = 8.0;
-// Share of the amplitude that sides of different levels are doubted by at most.
+// Largest uncertainty from sides of different levels, as a share of the amplitude.
 const UNEVEN = 0.06;
-// Grey levels that are no light, but whose square is no denormal number: those take a CPU many times as long.
+// Grey levels that count as no light. The square must not be denormal, because a CPU is many times slower then.
 const DARK = 1e-9;
-// Share of a number's information that is left at least where another number explains it.
+// Least share of a parameter's information that remains when another parameter explains it.
 const LEAST = 1e-5;
-// Share of the ceiling over which clipped pixels fall silent.
+// Share of the saturation level over which the weight of clipped pixels falls to 0.
 const SOFT = 0.05;
 
 // First word of the picture; set once.
@@ -43,7 +43,7 @@ fn crest(at: vec2<i32>, k: i32, step: i32, beside: i32) -> i32 {
     return (lit_across(at, k - step, beside) + lit_across(at, k, beside)) + lit_across(at, k + step, beside);
 }
 
-// The pixel of a wide stripe's middle: its skeleton runs beside that.
+// The pixel in the middle of a wide stripe, because its skeleton runs beside the middle.
 fn centred(at: vec2<i32>) -> vec2<i32> {
     if frame.s0 < BROAD {
         return at;
@@ -68,7 +68,7 @@ fn centred(at: vec2<i32>) -> vec2<i32> {
     return clamp(p, vec2(0), vec2(frame.width - 1, frame.height - 1));
 }
 
-// Square of what the two sides' levels differ by beyond their noise.
+// Square of the difference between the two sides' levels, minus their noise.
 var<private> uneven2: f32;
 fn background(x: i32, y: i32, n: vec2<f32>) -> f32 {
     let start = i32(floor(4.0 * frame.s0 + 0.5));
@@ -140,7 +140,7 @@ fn finish(at: vec2<i32>, n: vec2<f32>, m: f32, amplitude: f32, width: f32, sigma
     return peak;
 }
 
-// For how much a sample counts, and the share of that which is clipped.
+// Weight of a sample, and the clipped share of that weight.
 var<private> with_all: array<vec2<f32>, 20>;
 var<private> lost: array<vec2<f32>, 20>;
 var<private> weight: f32;
@@ -176,8 +176,8 @@ var<private> gain: f32;
 var<private> speckle2: f32;
 var<private> ceiling: f32;
 var<private> soft: f32;
-// Sums over certainty times model squared times z^0, z^1, .. z^4; certainty, residual, model and z^0, z^1, z^2; certainty
-// and residual squared; weights.
+// Sums over certainty times model squared times z^0, z^1, .. z^4; certainty, residual, model and z^0, z^1, z^2;
+// certainty and residual squared; weights.
 var<private> e0: vec2<f32>;
 var<private> e1: vec2<f32>;
 var<private> e2: vec2<f32>;
@@ -190,7 +190,7 @@ var<private> squares: vec2<f32>;
 var<private> believed: vec2<f32>;
 fn fit_pair(j: i32) {
     if j < 2 * quads {
-        // Clipped pixels pull while the model is below them, and are silent above.
+        // A clipped pixel counts while the model is below it, and has no weight above.
         let above = clamp(soft * (model - vec2(ceiling)) + vec2(0.5), vec2(0.0), vec2(1.0));
         let silent = above * lost[j];
         let heard = max(vec2(1.0) - silent, vec2(1e-3));
@@ -252,8 +252,8 @@ fn gaussian(at: vec2<i32>) -> Peak {
         let z0 = (profile.offset - m) * inverse;
         z = vec2(z0, z0 - wide);
         dz = vec2(wide, -wide);
-        // A Gaussian at equal steps: its ratio from sample to sample falls by a constant factor. From the middle to both
-        // sides, because what has become 0 stays 0.
+        // A Gaussian at equal steps: its ratio from sample to sample falls by a constant factor. From the middle to
+        // both sides, because what has become 0 stays 0.
         model = a * exponential(-0.5 * (z * z));
         ratio = exponential(-0.5 * (dz * dz) - dz * z);
         fall = exponential(vec2(-(wide * wide))).x;
@@ -293,7 +293,7 @@ fn gaussian(at: vec2<i32>) -> Peak {
         let dm = clamp(width * x1, -0.7 * s0, 0.7 * s0);
         let dw = clamp(width * x2, -0.3 * s0, 0.3 * s0);
         i11 = (width * width) / d1;
-        // By what this step lowers the squares: they are wanted where the fit ends.
+        // Subtract what this step lowers the squares by, because they are needed at the end of the fit.
         drop = (g0 * (da / a) + g1 * (dm / width)) + g2 * (dw / width);
         a = max(a + da, 1.0);
         m = clamp(m + dm, m0 - 2.0 * s0, m0 + 2.0 * s0);
@@ -350,7 +350,8 @@ fn centroid(at: vec2<i32>) -> Peak {
     centroid_pair(18); centroid_pair(19);
     let all = sum.x + sum.y;
     let middle = (moment.x + moment.y) / all;
-    let m = select(m0, clamp(profile.offset + profile.step * middle, m0 - 2.0 * frame.s0, m0 + 2.0 * frame.s0), all > 0.0);
+    let m = select(m0, clamp(profile.offset + profile.step * middle, m0 - 2.0 * frame.s0, m0 + 2.0 * frame.s0),
+        all > 0.0);
     let spread = (second.x + second.y) / max(all, 1e-6) - middle * middle;
     let width = sqrt(max((profile.step * profile.step) * spread - profile.blur2, 0.0));
     let share = profile.square / (profile.weight * profile.weight);
@@ -392,7 +393,7 @@ fn derivative(at: vec2<i32>) -> Peak {
     return finish(c, n, m, max(bright, 1.0), width, sqrt(noise) / max(-d2, 1e-6), saturated);
 }
 
-// Where nothing says in which part of the pixel the centre lies.
+// The standard deviation if nothing shows in which part of the pixel the centre lies.
 const EVEN = 0.28867513;
 
 fn itself(at: vec2<i32>) -> Peak {

@@ -1,6 +1,6 @@
-// In: peaks, the strongest of each line across the stripe, the rig, a pose a shot. Out: the reason of peaks that are weak
-// beside another: echoes, and spots cut by an edge; of the others points in the poses' frame with their standard deviation, bits
-// `none` where there is none. Twin and reasons: src/stages/stripe/choose.rs, point.rs; docs/math.md, Stripe peak (7), (8). Frame and unit: mm.
+// Rejects peaks that are weak beside the strongest on the lines nearby: echoes, and spots cut by an edge. Computes the
+// points of the others in the poses' frame, mm, with their standard deviation. A rejected peak's point has the bits
+// `none`. Twin and reasons: src/stages/stripe/choose.rs, point.rs; docs/math.md, Stripe peak (7), (8).
 struct PointFrame {
     fx: f32,
     fy: f32,
@@ -56,7 +56,7 @@ override full_lens: u32 = 0u;
 
 const NEWTON = 5u;
 
-// The reason against a peak beside the strongest of the lines nearby.
+// The reason for rejecting a peak, compared with the strongest peaks of the lines nearby.
 fn beside(k: Peak) -> u32 {
     let along = i32(line_of(k.pixel));
     let low = max(along - frame.echo_reach, 0);
@@ -142,7 +142,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let my = dz * y + z * dy;
         let sigma = sqrt(mx * mx + (my * my + dz * dz)) * k.sigma_px;
         let p = vec3(x * z, y * z, z);
-        let spot = vec4(row(poses[3u * k.shot], p), row(poses[3u * k.shot + 1u], p), row(poses[3u * k.shot + 2u], p), sigma);
+        let spot = vec4(row(poses[3u * k.shot], p), row(poses[3u * k.shot + 1u], p), row(poses[3u * k.shot + 2u],
+            p), sigma);
         // The first reason stays.
         let alone = k.flags & REASON;
         let compared = select(alone, beside(k), alone == 0u);

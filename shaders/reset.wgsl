@@ -1,4 +1,4 @@
-// In: the lists' headers of the former batch. Out: empty lists; at a further round of thinning (step 1)
+// In: the lists' headers of the previous batch. Out: empty lists; at a further round of thinning (step 1)
 // the lists of tiles that may be lit, and of those that are, stay. Headers are HEADER_WORDS apart. Each of those
 // has a buffer of its own: no buffer can be both read for the size of a dispatch and written by it.
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -1,5 +1,5 @@
-// In: responses and, for every turn, where each feature of the model reads them. Out: the sum over the features at every
-// strided place, one byte a place; at most 63 features of 4 each, so that bytes added as words never carry.
+// In: responses and, for every turn, where each feature of the model reads them. Out: the sum over the features at
+// every strided place, one byte a place; at most 63 features of 4 each, so that bytes added as words never carry.
 // Frame and unit: strided cells; a perfect feature scores 4.
 @group(0) @binding(0) var<uniform> frame: ShapeFrame;
 @group(0) @binding(1) var<storage, read> responses: array<u32>;

@@ -1,6 +1,6 @@
 // In: one bit a cell for its direction. Out: how well each strided place meets each of 16 directions within a window of
-// 4x4 cells: 4, 3, 1 or 0 for 0, 1, 2, more directions off; one byte a place, ordered by direction, phase, row, column, so
-// that a model's sum runs over contiguous bytes ([hinterstoisser12]). Frame and unit: cells of the level.
+// 4x4 cells: 4, 3, 1 or 0 for 0, 1, 2, more directions off; one byte a place, ordered by direction, phase, row,
+// column, so that a model's sum runs over contiguous bytes ([hinterstoisser12]). Frame and unit: cells of the level.
 @group(0) @binding(0) var<uniform> frame: ShapeFrame;
 @group(0) @binding(1) var<storage, read> bits: array<u32>;
 @group(0) @binding(2) var<storage, read_write> responses: array<u32>;
@@ -36,7 +36,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             for (var k = 0u; k < 4u; k++) {
                 // The wanted direction moves to bit 2, its neighbours to bits 0, 1, 3 and 4.
                 let turned = ((near[k] | (near[k] << 16u)) >> ((want + 14u) % 16u)) & 31u;
-                let value = select(select(select(0u, 1u, (turned & 17u) != 0u), 3u, (turned & 10u) != 0u), 4u, (turned & 4u) != 0u);
+                let value = select(select(select(0u, 1u, (turned & 17u) != 0u), 3u, (turned & 10u) != 0u), 4u,
+                    (turned & 4u) != 0u);
                 word |= value << (8u * k);
             }
             responses[frame.first + (want * 16u + id.y) * plane + id.x] = word;

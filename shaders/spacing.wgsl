@@ -1,5 +1,5 @@
-// In: the skeleton, lit pixels. Out: of each run of its pixels across the stripe the one in the middle, and every so many from it; a run's
-// pixels follow one another within that distance. Lit pixels with no company are left out. Frame and unit: pixels.
+// Thins the skeleton across the stripe. A run is a row of skeleton pixels within `spacing` of each other. Of each run
+// the middle pixel stays, and from it every pixel at a multiple of `spacing`. Isolated lit pixels are removed.
 // Twin and reasons: src/stages/stripe/lines/spacing.rs.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
@@ -8,8 +8,8 @@
 @group(0) @binding(4) var<storage, read> mask: array<u32>;
 @group(0) @binding(5) var<storage, read_write> spaced: array<u32>;
 
-// Pixels of the run beyond one of its pixels, on one side (a mask of lines that were carried on may hold another batch's where
-// nothing is lit); FAR where there is no end within so many pixels.
+// Pixels of the run beyond one of its pixels, on one side (a mask of lines that were carried on may hold another
+// batch's where nothing is lit); FAR if the run has no end within FAR pixels.
 fn beyond(shot: u32, x: i32, y: i32, across: vec2<i32>) -> i32 {
     let step = i32(frame.spacing & 0xffffu);
     var found = 0;
@@ -81,8 +81,9 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     }
 }
 
-// A run that goes on for longer has no middle that can be found from here: its pixels are counted from the picture's border.
+// A run that goes on for longer has no middle that can be found from here: its pixels are counted from the picture's
+// border.
 const FAR: i32 = 32;
-// A lit pixel with no other one this near, in columns and rows, is no stripe's; the setting's bit that asks for it.
+// A lit pixel without another one this close, in columns and rows, is not a stripe's; the setting's bit for it.
 const NEAR: i32 = 3;
 const COMPANY: u32 = 0x20000u;

@@ -1,6 +1,7 @@
-// In: pictures, tiles that stand alone in the list, each with the least sum of the windows around its pixels. Out: those
-// with one pixel that passes against that are settled, in both masks and the list of lit tiles; those with more go on
-// as runs of one. In noise that is what most listed tiles are: one window's sum is half the work of the tile's.
+// Handles the tiles that stand alone in the list, each with the least sum of the windows around its pixels. A tile
+// with one candidate pixel against that sum is finished here, in both masks and the list of lit tiles. A tile with
+// more becomes a run of one. In noise most listed tiles have one candidate, and one window's sum is half the work of
+// the tile's.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> image: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> listing: array<u32>;

@@ -72,7 +72,8 @@ fn block8(first: u32, top: u32) -> vec2<u32> {
     let largest = most(max(max(m0, m1), max(m2, m3))) >> 24u;
     let smallest = least(min(min(n0, n1), min(n2, n3))) >> 24u;
     let quad = least(quads) >> 17u;
-    return vec2(((sum.x + sum.y) + (sum.z + sum.w)) | (largest << 15u) | (smallest << 24u), row_least | (least(columns) << 12u) | (quad << 23u));
+    return vec2(((sum.x + sum.y) + (sum.z + sum.w)) | (largest << 15u) | (smallest << 24u),
+        row_least | (least(columns) << 12u) | (quad << 23u));
 }
 
 fn block16(first: u32, top: u32) -> vec2<u32> {

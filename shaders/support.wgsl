@@ -1,6 +1,7 @@
-// In: peaks of some shots with their points, the points of the shots beside them in order along the laser line. Out: each
-// peak's flags; kept ones with too few neighbours there carry the reason. Whole numbers, so that every machine counts the
-// same neighbours. Twin and reasons: src/stages/support/stage.rs. Frame and unit: base frame, 2^-14 mm; grey levels; px.
+// In: peaks of some shots with their points, the points of the shots beside them in order along the laser line. Out:
+// each peak's flags; kept ones with too few neighbours there carry the reason. Whole numbers, so that every machine
+// counts the same neighbours. Twin and reasons: src/stages/support/stage.rs. Frame and unit: base frame, 2^-14 mm;
+// grey levels; px.
 struct SupportFrame {
     peaks: u32,
     sure: f32,

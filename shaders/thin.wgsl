@@ -17,7 +17,8 @@ fn add(c: Count, bit: vec4<u32>) -> Count {
     return Count(c.one | bit, c.more | (c.one & bit));
 }
 
-fn zhang_suen(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: vec4<u32>, p7: vec4<u32>, p8: vec4<u32>, p9: vec4<u32>, second: bool) -> vec4<u32> {
+fn zhang_suen(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: vec4<u32>, p7: vec4<u32>,
+    p8: vec4<u32>, p9: vec4<u32>, second: bool) -> vec4<u32> {
     var a = Count(~p2 & p3, vec4(0u));
     a = add(a, ~p3 & p4);
     a = add(a, ~p4 & p5);
@@ -47,7 +48,8 @@ fn two_of(a: vec4<u32>, b: vec4<u32>, c: vec4<u32>, d: vec4<u32>) -> vec4<u32> {
     return (a & b) | (c & d) | ((a | b) & (c | d));
 }
 
-fn guo_hall(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: vec4<u32>, p7: vec4<u32>, p8: vec4<u32>, p9: vec4<u32>, second: bool) -> vec4<u32> {
+fn guo_hall(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: vec4<u32>, p7: vec4<u32>, p8: vec4<u32>,
+    p9: vec4<u32>, second: bool) -> vec4<u32> {
     var c = Count(~p2 & (p3 | p4), vec4(0u));
     c = add(c, ~p4 & (p5 | p6));
     c = add(c, ~p6 & (p7 | p8));
@@ -63,7 +65,8 @@ fn guo_hall(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: vec4
 // 0 Zhang-Suen, 1 Guo-Hall: a constant, so that the other rule is not in the code.
 override rule: u32 = 0u;
 
-fn gone_of(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: vec4<u32>, p7: vec4<u32>, p8: vec4<u32>, p9: vec4<u32>) -> vec4<u32> {
+fn gone_of(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: vec4<u32>, p7: vec4<u32>, p8: vec4<u32>,
+    p9: vec4<u32>) -> vec4<u32> {
     let second = (frame.step & 1u) != 0u;
     if rule == 0u {
         return zhang_suen(p2, p3, p4, p5, p6, p7, p8, p9, second);
@@ -125,7 +128,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         gone1 &= here1 & select(vec4(0u), vec4(deletable), row1 + vec4(1u) < last);
         after[2u * at] = here0 & ~gone0;
         after[2u * at + 1u] = here1 & ~gone1;
-        // Only its own: shortening the list looks at the stamps around, eight stores here would cost a third of the stage.
+        // Only its own: shortening the list looks at the stamps around, eight stores here would cost a third of the
+        // stage.
         let both = gone0 | gone1;
         if ((both.x | both.y) | (both.z | both.w)) != 0u {
             stamps[at] = frame.step + 3u;

@@ -1,5 +1,5 @@
-// In: pictures and a list of tiles, each a run of one. Out: as `threshold`, with Gaussian weights: along the row first, then
-// down the rows, f32, both in ascending order as the twin does.
+// In: pictures and a list of tiles, each a run of one. Out: as `threshold`, with Gaussian weights: along the row
+// first, then down the rows, f32, both in ascending order as the twin does.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 @group(0) @binding(2) var<storage, read> listing: array<u32>;
@@ -9,7 +9,8 @@
 
 fn blurred(first: u32, x: i32, r: i32) -> vec4<f32> {
     var sum = vec4(0.0);
-    var next = vec4<f32>(vec4(pixel(first, x - r), pixel(first, x - r + 1), pixel(first, x - r + 2), pixel(first, x - r + 3)));
+    var next = vec4<f32>(vec4(pixel(first, x - r), pixel(first, x - r + 1), pixel(first, x - r + 2), pixel(first,
+        x - r + 3)));
     for (var k = 0; k <= 2 * r; k++) {
         sum = sum + weights[k] * next;
         next = vec4(next.yzw, f32(pixel(first, x - r + k + 4)));

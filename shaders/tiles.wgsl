@@ -1,6 +1,6 @@
-// In: the block statistics. Out: the tiles (32 x 8) that may hold a lit pixel: those that stand alone, with the least sum
-// of the windows around their pixels; longer runs of up to four, one below the other; and how many there are. Runs begin
-// anew at every fourth row of tiles.
+// In: the block statistics. Out: the tiles (32 x 8) that may hold a lit pixel: those that stand alone, with the least
+// sum of the windows around their pixels; longer runs of up to four, one below the other; and how many there are.
+// Runs begin anew at every fourth row of tiles.
 // For every block a lower bound on the window sums around all of its pixels is put together from the blocks near it:
 // whole ones that every window covers, and smallest rows, columns and quads for the rest. Where even the block's
 // largest pixel does not pass against that bound, none of its pixels can pass against its true mean: the
@@ -69,8 +69,8 @@ fn more(b: Band, block: vec2<u32>, dy: i32, beyond: bool) -> Band {
     );
 }
 
-// Four tiles, one below the other: the column of the first, the row of it in its shot, the shot's first row of tiles and
-// last row.
+// Four tiles, one below the other: the column of the first, the row of it in its shot, the shot's first row of tiles
+// and last row.
 struct Strip {
     x: i32,
     y: i32,
@@ -122,8 +122,8 @@ struct Around {
     right: Near,
 }
 // The column of tiles `dx` beside the strip. Its rows and the columns are written out: Mesa leaves a loop as it is, and
-// half of this is constant. Those that no window reaches are left out where they are called, before Mesa sees them (decision
-// 0015); a radius of 50 reaches 7 rows of blocks and 2 columns of tiles.
+// half of this is constant. Those that no window reaches are left out where they are called, before Mesa sees them
+// (decision 0015); a radius of 50 reaches 7 rows of blocks and 2 columns of tiles.
 fn add_column(around: ptr<function, Around>, strip: Strip, dx: i32) {
     let x = strip.x + dx;
     var bands = Bands(EMPTY, EMPTY);

@@ -1,6 +1,6 @@
-//! In: this source, a small stage in two files (tests/data/added_stage). Out: whether two files and a line are all that a new stage
-//! takes (ARCHITECTURE.md, One stage): a copy of the source with them is built, and the tests of all stages run over it.
-//! SHEETLIGHT_LONG=1; the short form looks whether the places are there. Frame and unit: pixels.
+//! In: this source, a small stage in two files (tests/data/added_stage). Out: whether two files and a line are all
+//! that a new stage takes (ARCHITECTURE.md, One stage): a copy of the source with them is built, and the tests of all
+//! stages run over it. SHEETLIGHT_LONG=1; the short form looks whether the places are there. Frame and unit: pixels.
 
 mod common;
 

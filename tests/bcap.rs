@@ -61,7 +61,8 @@ fn same(a: &str, b: &str) -> bool {
     a.len() == b.len()
         && a.iter().zip(&b).all(|(a, b)| {
             a == b
-                || matches!((a.parse::<f64>(), b.parse::<f64>()), (Ok(a), Ok(b)) if (a - b).abs() <= 1e-11 * a.abs().max(b.abs()))
+                || matches!((a.parse::<f64>(), b.parse::<f64>()), (Ok(a),
+                    Ok(b)) if (a - b).abs() <= 1e-11 * a.abs().max(b.abs()))
         })
 }
 

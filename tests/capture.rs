@@ -1,5 +1,6 @@
-//! In: cameras that are played, simulated, piped, filled into folders, streamed over GigE Vision, with and without faults. Out: whether every picture
-//! is recorded or counted, paired with where things truly stood, and scanned as a file's.
+//! In: cameras that are played, simulated, piped, filled into folders, streamed over GigE Vision, with and without
+//! faults. Out: whether every picture is recorded or counted, paired with where things truly stood, and scanned as a
+//! file's.
 //! Frame and unit: pixels, mm, ms.
 
 mod common;

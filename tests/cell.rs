@@ -1,5 +1,5 @@
-//! In: a simulated cell on its wires. Out: whether controller, camera, motion rules and job behave as they must; judged by the
-//! controller's own log and by the truth of the cell.
+//! In: a simulated cell on its wires. Out: whether controller, camera, motion rules and job behave as they must;
+//! judged by the controller's own log and by the truth of the cell.
 //! Frame and unit: base frame, mm, degrees; times in ms.
 
 mod common;

@@ -1,5 +1,6 @@
 //! In: valid files of every format that a person or another program writes, damaged at random. Out: each
-//! parser answers with a value or an error that names something and says what to do next; none panics, hangs or eats memory.
+//! parser answers with a value or an error that names something and says what to do next; none panics, hangs or eats
+//! memory.
 //! Frame and unit: none. As many mutations of each as SHEETLIGHT_LONG says (100,000 where it is 1), 300 without
 //! it. What once failed is in tests/corpus and is read first.
 

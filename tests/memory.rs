@@ -121,8 +121,8 @@ fn a_long_scan_needs_no_more_memory_than_a_short_one() {
         processors.push(("GPU", Processor::Gpu(device.clone()), Some(device)));
     }
     for (name, processor, device) in processors {
-        // The first scans also fill caches of the allocator and of the driver: on lavapipe, whose compiler works on every
-        // thread, some ten of them, whatever their length. 700 shots fill the sample of the grid.
+        // The first scans also fill caches of the allocator and of the driver: on lavapipe, whose compiler works on
+        // every thread, some ten of them, whatever their length. 700 shots fill the sample of the grid.
         let mut still = 0;
         for scans in 0.. {
             assert!(scans < 30, "{name}: {scans} scans of 700 shots, and each takes more memory than the one before");

@@ -1,6 +1,6 @@
-//! In: tests/data/outside, a program that uses the library as others do, and a simulated station. Out: whether it gets what `scan`
-//! gets. Its sources are compiled into this test too, which is quick; SHEETLIGHT_LONG=1 builds and runs the program itself,
-//! without the features it does not ask for. Frame and unit: robot's base, mm.
+//! In: tests/data/outside, a program that uses the library as others do, and a simulated station. Out: whether it
+//! gets what `scan` gets. Its sources are compiled into this test too, which is quick; SHEETLIGHT_LONG=1 builds and
+//! runs the program itself, without the features it does not ask for. Frame and unit: robot's base, mm.
 
 #[allow(dead_code)]
 #[path = "data/outside/src/main.rs"]

@@ -1,5 +1,5 @@
-//! In: what `cargo package` would publish. Out: a failure where the crate grows, where it lacks a file that its sources read while they
-//! are built, and where its README leads to a file that is not in it.
+//! In: what `cargo package` would publish. Out: a failure where the crate grows, where it lacks a file that its
+//! sources read while they are built, and where its README leads to a file that is not in it.
 //! Frame and unit: bytes.
 
 use std::collections::BTreeSet;

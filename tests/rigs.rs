@@ -1,5 +1,5 @@
-//! In: the designs in data/rigs. Out: each simulated, calibrated, scanned on GPU and twins and searched through the command
-//! line, judged by what its own pixels, light and geometry predict; with UPDATE_RIGS=1 the table docs/rigs.md.
+//! In: the designs in data/rigs. Out: each simulated, calibrated, scanned on GPU and twins and searched through the
+//! command line, judged by what its own pixels, light and geometry predict; with UPDATE_RIGS=1 the table docs/rigs.md.
 //! Frame and unit: scene frame of the simulated scan, mm; errors also in pixel footprints of the rig.
 
 mod common;
@@ -76,11 +76,12 @@ impl Known {
         (known, truth)
     }
 
-    /// Least standard deviation of a centre across a stripe of `sigma` px whose peak is `grey` of full scale, averaged along
-    /// the stripe as the fit does, from the light that it reads, three sigmas to both sides (docs/math.md, Stripe peak): H⁻¹ (sum w² F) H⁻¹,
-    /// H = sum w F, F a pixel's Fisher information of height, centre and width. A narrow stripe's centre is known better between two
-    /// pixels than on one, and not apart from its width: the mean over all places. (Of a quiet sensor and speckle the fourth sigma, light of
-    /// 1 % and less of the peak, would halve the variance where nothing else sheds so little light.)
+    /// Least standard deviation of a centre across a stripe of `sigma` px whose peak is `grey` of full scale,
+    /// averaged along the stripe as the fit does, from the light that it reads, three sigmas to both sides
+    /// (docs/math.md, Stripe peak): H⁻¹ (sum w² F) H⁻¹, H = sum w F, F a pixel's Fisher information of height, centre
+    /// and width. A narrow stripe's centre is known better between two pixels than on one, and not apart from its
+    /// width: the mean over all places. (Of a quiet sensor and speckle the fourth sigma, light of 1 % and less of the
+    /// peak, would halve the variance where nothing else sheds so little light.)
     fn bound_px(&self, sigma: f64, grey: f64) -> f64 {
         let peak = grey / self.full * self.full_well;
         let quantum = self.full_well / self.full;
@@ -104,14 +105,15 @@ impl Known {
         ((0..places).map(variance).sum::<f64>() / f64::from(places)).sqrt()
     }
 
-    /// Tangent of the angle between the stripe's normal and the image axis that is nearer to it, in the picture's middle; 0..=1.
+    /// Tangent of the angle between the stripe's normal and the image axis that is nearer to it, in the picture's
+    /// middle; 0..=1.
     fn lean(&self) -> f64 {
         let [x, y] = [self.plane.normal.x.abs(), self.plane.normal.y.abs()];
         x.min(y) / x.max(y)
     }
 
-    /// How far a point of a level surface moves up for one pixel across the stripe's picture, mm: the viewing ray of the
-    /// moved pixel meets the sheet elsewhere.
+    /// How far a point of a level surface moves up for one pixel across the stripe's picture, mm: the viewing ray of
+    /// the moved pixel meets the sheet elsewhere.
     fn rise_per_px(&self, p: &CloudPoint) -> f64 {
         let pose = &self.scene_from_camera[p.shot as usize];
         let at = |px: Vec2| self.camera.ray_from_pixel(&px).and_then(|r| r.meet(&self.plane)).unwrap();
@@ -143,7 +145,8 @@ struct Row {
     step_sigmas: [f64; 4],
     /// Place (mm, in the plane), height (mm) and turn (degrees) of the part against the truth; or why not found.
     part: Result<[f64; 3], String>,
-    /// The sheet is thicker (four sigmas) than the part's notch is deep: over half of the edges it lies on both sides at once.
+    /// The sheet is thicker (four sigmas) than the part's notch is deep: over half of the edges it lies on both sides
+    /// at once.
     thick: bool,
     /// How GPU and twins differ.
     gpu: Option<Apart>,
@@ -225,8 +228,9 @@ fn run(name: &str, file: &Path, at: &Path, width: Option<u32>, shots: Option<usi
             })
             .collect(),
     );
-    // Near a tread's edge a part of the stripe's profile falls beside it: the fit reads it as far as 2.4 sigma, and the lens blurs. A profile
-    // along an image axis that is not the stripe's normal reads its flanks, three sigmas out, farther along by the tangent.
+    // Near a tread's edge a part of the stripe's profile falls beside it: the fit reads it as far as 2.4 sigma, and
+    // the lens blurs. A profile along an image axis that is not the stripe's normal reads its flanks, three sigmas
+    // out, farther along by the tangent.
     let profile = |lean: f64| 3.0 * sigma * (1.0 + lean) * footprint;
     let lean = known.lean();
     let margin = [(0.2 * TREAD_MM[0] * u).max(profile(lean)), (0.15 * TREAD_MM[1] * u).max(profile(0.0))];
@@ -304,7 +308,8 @@ fn find(at: &Path, truth: &Truth) -> Result<[f64; 3], String> {
     Ok([t.x.hypot(t.y), t.z.abs(), off.rotation_vector().norm().to_degrees()])
 }
 
-/// `over`: what own-plane rms may be over the prediction. `coarse`: a part may be refused, with its reason, but not misplaced.
+/// `over`: what own-plane rms may be over the prediction. `coarse`: a part may be refused, with its reason, but not
+/// misplaced.
 fn judged(row: &Row, over: f64, coarse: bool) -> Vec<String> {
     let mut faults = Vec::new();
     let mut want = |ok: bool, what: String| {
@@ -324,39 +329,45 @@ fn judged(row: &Row, over: f64, coarse: bool) -> Vec<String> {
         Err(why) => want(coarse && why.contains("no pose:"), format!("part not found: {why}")),
     }
     if let Some(Apart { alone, worst_mm, .. }) = row.gpu {
-        // 0.001 mm at the reference rigs' pixel of 0.25 mm, and a step of the numbers that clouds are written in: 30 nm from 256 mm on.
+        // 0.001 mm at the reference rigs' pixel of 0.25 mm, and a step of the numbers that clouds are written in: 30
+        // nm from 256 mm on.
         want(worst_mm <= 0.004 * p + row.step, format!("GPU and twins differ by {worst_mm:.6} mm, footprint {p:.4}"));
         want(alone * 20_000 <= row.points, format!("{alone} points on GPU or twins alone"));
     }
     faults
 }
 
+/// Two tables, because one would be wider than a page, and below them why parts were refused.
 fn table(rows: &[Row]) -> String {
-    let mut out = String::from(
-        "| rig | footprint mm | camera, plane, hand-eye, all at once | points | plane rms px | over prediction | steps of 0.1, 0.5, 1, 5 units: errors px | part: place, height px, turn ° | GPU - twins px |\n|---|---|---|---|---|---|---|---|---|\n",
+    let mut points = String::from(
+        "| rig | footprint mm | camera, plane, hand-eye, all at once | points | plane rms px | over prediction |\n\
+         |---|---|---|---|---|---|\n",
     );
+    let mut parts = String::from(
+        "| rig | errors of steps of 0.1, 0.5, 1, 5 units, px | part: place, height px, turn ° | GPU - CPU px |\n\
+         |---|---|---|---|\n",
+    );
+    let mut refused = String::new();
     for r in rows {
         let p = r.footprint;
         let steps: Vec<String> = r.steps.iter().map(|s| format!("{:+.4}", s / p)).collect();
         let part = match &r.part {
             Ok([a, b, c]) => format!("{:.3}, {:.3}, {c:.3}", a / p, b / p),
-            Err(why) => why.clone(),
+            Err(why) => {
+                refused += &format!("\n- `{}` refused its part: {}\n", r.name, why.replace("; ", ";\n  "));
+                "refused".into()
+            }
         };
         let gpu = r.gpu.map_or("-".into(), |a| format!("{:.5} ({} alone)", a.worst_mm / p, a.alone));
-        out += &format!(
-            "| {} | {p:.4} | {} | {} | {:.4} | {:.2} | {} | {part} | {gpu} |\n",
-            r.name,
-            r.verdicts.join(", "),
-            r.points,
-            r.plane / p,
-            r.plane / r.predicted,
-            steps.join(" "),
-        );
+        let (verdicts, over) = (r.verdicts.join(", "), r.plane / r.predicted);
+        points += &format!("| {} | {p:.4} | {verdicts} | {} | {:.4} | {over:.2} |\n", r.name, r.points, r.plane / p);
+        parts += &format!("| {} | {} | {part} | {gpu} |\n", r.name, steps.join(" "));
     }
-    out
+    format!("{points}\n{parts}{refused}")
 }
 
-/// One rig with small pictures and few shots on the twins; all of them, as they are and on the GPU too, with SHEETLIGHT_LONG.
+/// One rig with small pictures and few shots on the twins; all of them, as they are and on the GPU too, with
+/// SHEETLIGHT_LONG.
 #[test]
 fn rigs_are_calibrated_scanned_and_searched() {
     let long = std::env::var_os("SHEETLIGHT_LONG").is_some();
@@ -374,7 +385,7 @@ fn rigs_are_calibrated_scanned_and_searched() {
         let dir = tempfile::tempdir().unwrap();
         let (width, shots) = if long { (narrow, Some(80)) } else { (Some(narrow.unwrap_or(400)), Some(36)) };
         let row = run(name, file, dir.path(), width, shots);
-        println!("{}", table(std::slice::from_ref(&row)).lines().last().unwrap());
+        println!("{}", table(std::slice::from_ref(&row)));
         println!("   steps in predicted sigmas {:.2?}, completeness {:.3}", row.step_sigmas, row.completeness);
         faults.extend(judged(&row, 1.15, row.thick));
         rows.push(row);
@@ -384,9 +395,10 @@ fn rigs_are_calibrated_scanned_and_searched() {
         // What people wrote around the table stays.
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/rigs.md");
         let text = std::fs::read_to_string(&path).unwrap();
-        let (before, rest) = text.split_at(text.find("\n|").expect("a table") + 1);
-        let after: String = rest.split_inclusive('\n').skip_while(|line| line.starts_with('|')).collect();
-        std::fs::write(path, format!("{before}{}{after}", table(&rows))).unwrap();
+        let (begin, end) = ("<!-- tables of tests/rigs.rs -->\n", "<!-- end of tables -->");
+        let (before, rest) = text.split_once(begin).expect("the tables begin");
+        let (_, after) = rest.split_once(end).expect("the tables end");
+        std::fs::write(path, format!("{before}{begin}\n{}\n{end}{after}", table(&rows))).unwrap();
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
@@ -409,16 +421,18 @@ fn the_shipped_designs_are_many_and_sound() {
     some("a field of 10 mm", &|r| r.field_mm()[0] <= 10.1);
 }
 
-/// Own-plane rms over the prediction that a drawn rig may have. Most have 1.0 to 1.15; a quiet sensor's speckled stripe has 1.2 where it is
-/// narrow and slanted (a sample's pixels lie up to half a pixel apart across it, and their light differs) and 1.3 to 1.45 where it is wider
-/// than 4 px (its skeleton wanders, and the window with it).
+/// Own-plane rms over the prediction that a drawn rig may have. Most have 1.0 to 1.15; a quiet sensor's speckled
+/// stripe has 1.2 where it is narrow and slanted (a sample's pixels lie up to half a pixel apart across it, and their
+/// light differs) and 1.3 to 1.45 where it is wider than 4 px (its skeleton wanders, and the window with it).
 const DRAWN: f64 = 1.5;
 
-/// Rigs drawn from the space that stations are built in, calibrated, scanned and searched as the designed ones. `SHEETLIGHT_DRAWN=1-40`: these seeds.
+/// Rigs drawn from the space that stations are built in, calibrated, scanned and searched as the designed ones.
+/// `SHEETLIGHT_DRAWN=1-40`: these seeds.
 #[test]
 fn rigs_that_nobody_designed_are_as_good() {
     let long = std::env::var("SHEETLIGHT_DRAWN").ok();
-    // The short form's: a small picture on which noise that is measured across edges makes the error 1.9 of the prediction.
+    // The short form's: a small picture on which noise that is measured across edges makes the error 1.9 of the
+    // prediction.
     let (first, last, shots, over) = match &long {
         Some(seeds) => {
             let (first, last) = seeds.split_once('-').expect("first-last");
@@ -446,7 +460,7 @@ fn rigs_that_nobody_designed_are_as_good() {
             spec.sensor.speckle
         );
         let row = run(&spec.name, &file, dir.path(), None, Some(shots));
-        println!("{}", table(std::slice::from_ref(&row)).lines().last().unwrap());
+        println!("{}", table(std::slice::from_ref(&row)));
         println!("   steps in predicted sigmas {:.2?}, completeness {:.3}", row.step_sigmas, row.completeness);
         let found = judged(&row, over, true);
         found.iter().for_each(|f| println!("   FAULT {f}"));

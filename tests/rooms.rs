@@ -1,5 +1,5 @@
-//! In: the `use` lines and paths of src/. Out: a failure for files that import each other in a circle, and for rooms with too
-//! many files at one level (ARCHITECTURE.md).
+//! In: the `use` lines and paths of src/. Out: a failure for files that import each other in a circle, and for rooms
+//! with too many files at one level (ARCHITECTURE.md).
 //! Frame and unit: none.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -138,7 +138,8 @@ fn graph(all: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Module>> {
         let mut path = path.to_vec();
         for _ in 0..8 {
             let hit = (1..=path.len()).rev().find(|&n| {
-                // `batch` may be a room and the function that its doorway shows: where the path goes on, it is the room.
+                // `batch` may be a room and the function that its doorway shows: where the path goes on, it is the
+                // room.
                 let room = n < path.len() && all.contains_key(&path[..n]);
                 !room && doors.contains_key(&path[..n])
             });

@@ -125,8 +125,8 @@ fn validated(name: &str, module: &naga::Module) {
     validator.validate(module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
 }
 
-/// Loops run without a limit on their turns (gpu::Stage): each has to count to its end, or stands here with the reason why it
-/// ends.
+/// Loops run without a limit on their turns (gpu::Stage): each has to count to its end, or stands here with the
+/// reason why it ends.
 #[test]
 fn every_loop_ends() {
     let others = [

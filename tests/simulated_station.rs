@@ -89,7 +89,8 @@ fn a_noisy_sensor_gives_fewer_points_and_no_false_ones() {
     assert!((0.6..0.85).contains(&judged.within_sigmas[0]), "{:?}", judged.within_sigmas);
 }
 
-/// A real laser's speckle goes over several pixels: errors are larger than pixel noise would make them, and the points say so.
+/// A real laser's speckle goes over several pixels: errors are larger than pixel noise would make them, and the
+/// points say so.
 #[test]
 fn speckle_with_grains_is_in_what_the_points_state() {
     for (seed, grain_px) in [(6, 0.7), (7, 1.3)] {

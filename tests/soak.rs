@@ -1,5 +1,5 @@
-//! In: a station that works for half a day: a part every half minute is scanned and found, in one process. Out: memory, open files and threads
-//! are at the end what they were after the first tenth.
+//! In: a station that works for half a day: a part every half minute is scanned and found, in one process. Out:
+//! memory, open files and threads are at the end what they were after the first tenth.
 //! Frame and unit: counts, MB. SHEETLIGHT_LONG runs all of 12 hours' scans, else a sixtieth.
 #![cfg(target_os = "linux")]
 
@@ -22,8 +22,8 @@ const SCANS: usize = 12 * 3600 / 30;
 /// Pictures of this width, and so few of them, stand for the camera's: what is kept too long shows by the scan.
 const WIDTH: u32 = 160;
 const SHOTS: usize = 60;
-/// Every so many scans the part is found, too; a share of the scans is done on the GPU, where one is: each compiles its stages
-/// anew.
+/// Every so many scans the part is found, too; a share of the scans is done on the GPU, where one is: each compiles
+/// its stages anew.
 const FIND_EVERY: usize = 20;
 const GPU_EVERY: usize = 24;
 
@@ -117,8 +117,8 @@ fn twelve_hours_of_scans_hold_no_more_than_the_first() {
     if common::device().is_none() {
         return;
     }
-    // Its memory is printed, not judged: each of these scans opens the device and compiles its stages anew, and on lavapipe 0.4 MB
-    // a scan stay; who keeps them is not known yet.
+    // Its memory is printed, not judged: each of these scans opens the device and compiles its stages anew, and on
+    // lavapipe 0.4 MB a scan stay; who keeps them is not known yet.
     repeated("scans on the GPU", (SCANS / GPU_EVERY / share).max(4), |_| {
         one(&rig, &recording, &options(&at("out"), Where::Gpu));
     });

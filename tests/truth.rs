@@ -27,13 +27,13 @@ const PRINTED_BARS: [(&str, f64, f64, f64, f64); 4] = [
     ("scan_flash", 0.0389, 0.015, 0.0001, 0.9753),
 ];
 
-/// Points over columns that hold any, at most: a stripe crosses a column once, but for steps and what stands over the surface; every further
-/// fit of the same light has the same error again.
+/// Points over columns that hold any, at most: a stripe crosses a column once, but for steps and what stands over the
+/// surface; every further fit of the same light has the same error again.
 const CROSSINGS: f64 = 1.15;
 
 /// Every figure with its bar: path, least, most. Errors may be a quarter larger than those measured with the rig in the
-/// reference data, so that a change that costs a third shows. What is zero but for single points has a floor: 0.5 um for
-/// heights, one in ten thousand for shares.
+/// reference data, so that a change that costs a third shows. What is zero but for single points has a floor: 0.5 um
+/// for heights, one in ten thousand for shares.
 fn bars() -> Vec<(Vec<&'static str>, f64, f64)> {
     let mut bars = Vec::new();
     let mut limit = |path: &[&'static str], least, most| bars.push((path.to_vec(), least, most));
@@ -84,7 +84,8 @@ fn worse(score: &serde_json::Value, turned: bool) -> Vec<String> {
     faults
 }
 
-/// One line per figure of noise or completeness that a turn changes by more than 3 %; what is zero but for chance has its bar.
+/// One line per figure of noise or completeness that a turn changes by more than 3 %; what is zero but for chance has
+/// its bar.
 fn changed(score: &serde_json::Value, straight: &serde_json::Value) -> Vec<String> {
     let paths = bars().into_iter().map(|(path, ..)| path);
     let pairs = paths.filter(|path| sizes(path)).map(|path| (figure(score, &path), figure(straight, &path), path));
@@ -127,8 +128,8 @@ fn scans_with_the_true_calibration_meet_their_bars() {
     }
 }
 
-/// Print on the parts pulls points off their surfaces, as a sheet as thick as the rendered one does: without that the rms is a twentieth
-/// less at least.
+/// Print on the parts pulls points off their surfaces, as a sheet as thick as the rendered one does: without that the
+/// rms is a twentieth less at least.
 #[test]
 fn what_the_sheets_thickness_does_is_taken_out() {
     let Some(reference) = reference("sheet thickness") else { return };

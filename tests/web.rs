@@ -1,5 +1,5 @@
-//! In: the program and a simulated station. Out: failure where its screen lets somebody in, loses a job, cannot be operated
-//! through its real pages, or is described otherwise than it is.
+//! In: the program and a simulated station. Out: failure where its screen lets somebody in, loses a job, cannot be
+//! operated through its real pages, or is described otherwise than it is.
 //! Frame and unit: mm, degrees, px.
 
 mod common;
@@ -13,7 +13,8 @@ fn source(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
 }
 
-/// A station that scanned a part of the board that is simulated by default; all of it where pictures for the documents are made.
+/// A station that scanned a part of the board that is simulated by default; all of it where pictures for the
+/// documents are made.
 fn station(whole: bool) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().to_str().unwrap();
@@ -63,7 +64,8 @@ fn python(script: &str, args: &[&str]) -> bool {
     false
 }
 
-/// The program under test: this build, or the one that `SHEETLIGHT_BIN` names, such as a release build for the long forms.
+/// The program under test: this build, or the one that `SHEETLIGHT_BIN` names, such as a release build for the long
+/// forms.
 fn program() -> &'static str {
     static NAMED: OnceLock<String> = OnceLock::new();
     NAMED

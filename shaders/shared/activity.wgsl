@@ -1,6 +1,6 @@
 // A stamp holds 3 + the sub-iteration in which a tile last changed, 0 for never. What follows from pixels that did not
-// change in the last two sub-iterations (both parities of the rule) does not change either, so a tile goes on only while
-// its own stamp or one beside it is that fresh.
+// change in the last two sub-iterations (both parities of the rule) does not change either, so a tile goes on only
+// while its own stamp or one beside it is that fresh.
 // The latest stamp of a tile and its eight neighbours:
 fn latest(tile: u32) -> u32 {
     let x = i32(tile_x(tile));

@@ -57,8 +57,10 @@ fn sum_of_columns(begin: u32, n: u32, loads: u32) -> u32 {
         let even = sums[2u * i];
         let odd = sums[2u * i + 1u];
         if px_log2 == 2u {
-            sum += (even & vec4(0xffffu) & chosen(c, begin, n)) + ((even >> vec4(16u)) & chosen(c + vec4(2u), begin, n));
-            sum += (odd & vec4(0xffffu) & chosen(c + vec4(1u), begin, n)) + ((odd >> vec4(16u)) & chosen(c + vec4(3u), begin, n));
+            sum += (even & vec4(0xffffu) & chosen(c, begin, n)) + ((even >> vec4(16u)) & chosen(c + vec4(2u), begin,
+                n));
+            sum += (odd & vec4(0xffffu) & chosen(c + vec4(1u), begin, n)) + ((odd >> vec4(16u)) & chosen(c
+                + vec4(3u), begin, n));
         } else {
             sum += (even & chosen(c, begin, n)) + (odd & chosen(c + vec4(1u), begin, n));
         }

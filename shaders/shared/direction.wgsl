@@ -1,9 +1,9 @@
-// In: a picture, a skeleton pixel. Out: the unit vector across the stripe there. Twin and reasons: src/stages/peak/across/direction.rs;
-// docs/math.md, Stripe peak (1). Frame and unit: pixels.
+// In: a picture, a skeleton pixel. Out: the unit vector across the stripe there. Twin and reasons:
+// src/stages/peak/across/direction.rs; docs/math.md, Stripe peak (1). Frame and unit: pixels.
 
 // Directions that are taken in turn beside a border.
 const BORDER_STEPS = 2u;
-// Share of a stripe's direction that leads out of the picture, from which on it leaves there.
+// From this share of its direction on a stripe counts as leaving the picture there.
 const LEAVES = 0.3;
 
 fn whole(x: i32, y: i32) -> i32 {
@@ -24,15 +24,17 @@ const TWO = 36;
 const FAR = 16;
 const NONE = 64;
 
-// The structure tensor from 13 gradients on 24 grey levels, every other place of a lattice, in whole numbers: half the difference of
-// its diagonal, the other element, half the difference of its eigenvalues.
+// The structure tensor from 13 gradients on 24 grey levels, every other place of a lattice, in whole numbers: half
+// the difference of its diagonal, the other element, half the difference of its eigenvalues.
 fn tensor(x: i32, y: i32, u: i32, v: i32) -> vec3<f32> {
     let a = vec3(whole(x - 2 * u, y - 3 * v), whole(x, y - 3 * v), whole(x + 2 * u, y - 3 * v));
-    let b = vec4(whole(x - 3 * u, y - 2 * v), whole(x - u, y - 2 * v), whole(x + u, y - 2 * v), whole(x + 3 * u, y - 2 * v));
+    let b = vec4(whole(x - 3 * u, y - 2 * v), whole(x - u, y - 2 * v), whole(x + u, y - 2 * v), whole(x + 3 * u,
+        y - 2 * v));
     let c = vec3(whole(x - 2 * u, y - v), whole(x, y - v), whole(x + 2 * u, y - v));
     let d = vec4(whole(x - 3 * u, y), whole(x - u, y), whole(x + u, y), whole(x + 3 * u, y));
     let e = vec3(whole(x - 2 * u, y + v), whole(x, y + v), whole(x + 2 * u, y + v));
-    let f = vec4(whole(x - 3 * u, y + 2 * v), whole(x - u, y + 2 * v), whole(x + u, y + 2 * v), whole(x + 3 * u, y + 2 * v));
+    let f = vec4(whole(x - 3 * u, y + 2 * v), whole(x - u, y + 2 * v), whole(x + u, y + 2 * v), whole(x + 3 * u, y
+        + 2 * v));
     let g = vec3(whole(x - 2 * u, y + 3 * v), whole(x, y + 3 * v), whole(x + 2 * u, y + 3 * v));
     // Ten bits a gradient.
     let deep = max(countOneBits(u32(frame.full_scale)), 10u) - 10u;
@@ -70,7 +72,7 @@ fn turn_of(sc: vec2<f32>, c: vec4<f32>) -> f32 {
     return c.x * sc.x + (c.y * s4 + (c.z * (s4 * sc.y + c4 * sc.x) + c.w * (2.0 * (s4 * c4))));
 }
 
-// Across the stripe; what so far differences make of the direction is put right.
+// Across the stripe. Corrects the error that differences over this distance make in the direction.
 fn direction_at(x: i32, y: i32) -> vec2<f32> {
     var t = tensor(x, y, frame.lattice_u, frame.lattice_v);
     let seen = twice(t);

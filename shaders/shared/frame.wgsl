@@ -24,7 +24,8 @@ struct Frame {
     full_scale: u32,
     // Ends of skeletons: most pixels added, and from bit 16 on the share of brightness in 4096ths.
     lengthen: u32,
-    // Pixels from one of a run across the stripe to the next, and from bit 16 on 1 where runs lie along rows; 0 keeps all.
+    // Pixels from one of a run across the stripe to the next, and from bit 16 on 1 where runs lie along rows; 0 keeps
+    // all.
     spacing: u32,
 }
 

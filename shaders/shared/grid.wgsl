@@ -1,5 +1,6 @@
 // What the stages grid_span, grid_sum and grid_pick know, and where a point of the cloud lies: whole numbers only, so
-// that every machine fills the same cells. The fields are explained beside the struct of the same name, src/stages/grid.rs.
+// that every machine fills the same cells. The fields are explained beside the struct of the same name,
+// src/stages/grid.rs.
 struct GridFrame {
     width: u32,
     height: u32,

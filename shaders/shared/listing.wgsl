@@ -3,8 +3,8 @@ const GROUPS = 0u;
 const GROUPS_Y = 1u;
 const GROUPS_Z = 2u;
 const COUNT = 3u;
-// Further words of the pixel list's header: pixels found, of which COUNT are listed; tiles that were looked at closely; shortened
-// lists of thinning that still held a tile; pictures; the first pixel of every picture, and the end.
+// Further words of the pixel list's header: pixels found, of which COUNT are listed; tiles that were looked at
+// closely; shortened lists of thinning that still held a tile; pictures; the first pixel of every picture, and the end.
 const FOUND = 4u;
 const LISTED = 5u;
 const LEFT = 6u;

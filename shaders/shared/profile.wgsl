@@ -1,6 +1,6 @@
 // In: a picture, a skeleton pixel, the direction across the stripe. Out: the stripe's profile there, averaged along it.
-// Twin and reasons: src/stages/peak/profile.rs; docs/math.md, Stripe peak (2). Frame and unit: offsets from the skeleton
-// pixel, px; grey levels.
+// Twin and reasons: src/stages/peak/profile.rs; docs/math.md, Stripe peak (2). Frame and unit: offsets from the
+// skeleton pixel, px; grey levels.
 //
 // Work on every sample is written out as calls with constant arguments, so that samples are registers: an array with an
 // index that is known only at run time lies in memory, which Mesa's software adapter reads and writes lane by lane, and
@@ -51,9 +51,9 @@ struct Walk {
     across: u32,
 }
 
-// Pixels side by side with one shift: the first one's place at the first sample, -2 quads; weights in 127ths, two a word,
-// for samples k, k + 1, k + 2, k + 3, k that one or four, eight, .. after it: along a row the place within a word changes. Sums of weight, weight squared, weight times offset
-// across and times its square.
+// Pixels side by side with one shift: the first one's place at the first sample, -2 quads; weights in 127ths, two a
+// word, for samples k, k + 1, k + 2, k + 3, k that one or four, eight, .. after it: along a row the place within a
+// word changes. Sums of weight, weight squared, weight times offset across and times its square.
 struct Group {
     at: u32,
     even: vec4<u32>,
@@ -83,7 +83,8 @@ fn group(w: Walk, a: i32, row: i32) -> Group {
         let by_four = weights.z | (weights.x << 16u);
         let even = vec4(by_four) >> (vec4(8u) * (places & vec4(2u)));
         let is_odd = (places & vec4(1u)) == vec4(1u);
-        return Group(first_pixel, select(even, vec4(0u), is_odd), select(vec4(weights.w | (weights.y << 16u)), even, is_odd), moments);
+        return Group(first_pixel, select(even, vec4(0u), is_odd), select(vec4(weights.w | (weights.y << 16u)), even,
+            is_odd), moments);
     }
     let low = vec4(weights.x | (weights.y << 16u)) << (vec4(16u) * (places & vec4(1u)));
     return Group(first_pixel, low, vec4(weights.z | (weights.w << 16u)), moments);
@@ -94,7 +95,8 @@ fn shift(w: Walk, a: i32) -> i32 {
     return i32(floor(-((f32(a - w.x0) + select(0.0, 1.5, w.fours)) * w.na) / w.nb + 0.47));
 }
 
-// What a pixel adds: its level, or 128 if it is clipped. Of bytes, (read & cut) + add, and read itself, have what counts.
+// What a pixel adds: its level, or 128 if it is clipped. Of bytes, (read & cut) + add, and read itself, have what
+// counts.
 struct Sieve {
     again: bool,
     cut: u32,
@@ -121,15 +123,16 @@ fn sum_of(p: u32, even: u32, odd: u32) -> u32 {
     let limit = vec2(u32(frame.full_scale));
     let low = words & vec2(0xffffu);
     let high = words >> vec2(16u);
-    let clipped = (vec2(128u) * vec2<u32>(low >= limit)) * (weights & vec2(0xffffu)) + (vec2(128u) * vec2<u32>(high >= limit)) * (weights >> vec2(16u));
+    let clipped = (vec2(128u) * vec2<u32>(low >= limit)) * (weights & vec2(0xffffu)) + (vec2(128u)
+        * vec2<u32>(high >= limit)) * (weights >> vec2(16u));
     full |= clipped.x | clipped.y;
     let light = low * (weights & vec2(0xffffu)) + high * (weights >> vec2(16u));
     let sum = select(light, clipped, sieve.again);
     return sum.x + sum.y;
 }
 
-// Of an upright stripe four samples are four pixels of a word, or of two: the weighted sums of two rows, the pixels in pairs as
-// `even` and `odd` of a word are. The words that the next ones begin in are kept.
+// Of an upright stripe four samples are four pixels of a word, or of two: the weighted sums of two rows, the pixels
+// in pairs as `even` and `odd` of a word are. The words that the next ones begin in are kept.
 var<private> begun: vec2<u32>;
 fn four_of(word: vec2<u32>, bits: vec2<u32>, weights: vec2<u32>) -> vec4<u32> {
     let next = vec2(image[word.x], image[word.y]);
@@ -146,7 +149,8 @@ fn four_of(word: vec2<u32>, bits: vec2<u32>, weights: vec2<u32>) -> vec4<u32> {
 }
 
 fn three(k: u32, q: u32) -> u32 {
-    return (sum_of(groups[0].at + k, groups[0].even[q], groups[0].odd[q]) + sum_of(groups[1].at + k, groups[1].even[q], groups[1].odd[q]))
+    return (sum_of(groups[0].at + k, groups[0].even[q], groups[0].odd[q]) + sum_of(groups[1].at + k,
+        groups[1].even[q], groups[1].odd[q]))
         + sum_of(groups[2].at + k, groups[2].even[q], groups[2].odd[q]);
 }
 
@@ -214,7 +218,8 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
                 var k = 0u;
                 for (var q = 0; q < quads; q++) {
                     // The samples go round: four leave at the front and come back, with more light, at the end.
-                    let four = vec4(three(k, 0u), three(k + across, 1u), three(k + 2u * across, 2u), three(k + 3u * across, 3u));
+                    let four = vec4(three(k, 0u), three(k + across, 1u), three(k + 2u * across, 2u), three(k + 3u
+                        * across, 3u));
                     let v = sums[0] + vec4<f32>(vec4<i32>(four));
                     turn(0); turn(1); turn(2); turn(3); turn(4); turn(5); turn(6); turn(7); turn(8);
                     sums[quads - 1] = v;

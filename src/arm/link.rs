@@ -9,7 +9,8 @@ use std::sync::Arc;
 /// The variable that only a simulated controller has, and what it holds: so a link knows it, whatever its address.
 pub const SIMULATED: [&str; 2] = ["@SIMULATED_BY", "sheetlight cell"];
 
-/// Something that says where a flange is. Each has a connection of its own, so that one can be read while the arm moves.
+/// Something that says where a flange is. Each has a connection of its own, so that one can be read while the arm
+/// moves.
 pub trait PoseSource: Send {
     /// The pose now; for poses from a file the next one.
     fn pose(&mut self) -> Result<TimedPose>;
@@ -40,7 +41,8 @@ pub trait Arm: PoseSource {
     /// Mode, motor, errors, frames.
     fn state(&mut self) -> Result<State>;
 
-    /// The controller says that it is a simulated one. An address says nothing: a tunnel to a real one begins on this machine too.
+    /// The controller says that it is a simulated one. An address says nothing: a tunnel to a real one begins on this
+    /// machine too.
     fn simulated(&mut self) -> Result<bool> {
         Ok(false)
     }
@@ -73,8 +75,9 @@ pub trait Arm: PoseSource {
         Ok(())
     }
 
-    /// Makes one motion and returns when it has ended. Errors: it was not begun, or was stopped; the pose has to be read again. Of kind
-    /// [`crate::fault::Kind::Refused`] where the controller answered with an error, of another where nobody knows what it did.
+    /// Makes one motion and returns when it has ended. Errors: it was not begun, or was stopped; the pose has to be
+    /// read again. Of kind [`crate::fault::Kind::Refused`] where the controller answered with an error, of another
+    /// where nobody knows what it did.
     fn make(&mut self, _allowed: Allowed) -> Result<()> {
         Err(reads_only(self.name()))
     }

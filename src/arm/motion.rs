@@ -27,7 +27,8 @@ pub struct Motion {
 /// How fast a motion is made, so that no point that the flange carries is too fast.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pace {
-    /// Greatest speed of the flange's origin on a straight way, of any carried point where the arm chooses the way; mm/s.
+    /// Greatest speed of the flange's origin on a straight way, of any carried point where the arm chooses the way;
+    /// mm/s.
     pub flange_mm_s: f64,
     /// Greatest turning rate, degrees/s.
     pub turn_deg_s: f64,

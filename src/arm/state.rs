@@ -38,7 +38,7 @@ const LONGEST_S: f64 = 1e12;
 pub(super) fn stamp(seconds: f64) -> Result<Duration> {
     let believed = Duration::try_from_secs_f64(seconds).ok().filter(|_| seconds <= LONGEST_S);
     believed.ok_or_else(|| {
-        Fault::device(format!("a pose of the time {seconds:e} s, 0 to {LONGEST_S:e} are believed"))
+        Fault::device(format!("a pose of the time {seconds:e} s, 0 to {LONGEST_S:e} are accepted"))
             .cause("the stream of poses is damaged, or the controller's answer means something else")
             .next("look at the robot, then connect again")
     })
@@ -107,7 +107,7 @@ mod tests {
     fn a_stamp_that_no_clock_shows_is_refused() {
         assert_eq!(stamp(12.5).unwrap(), Duration::from_millis(12_500));
         for wrong in [f64::INFINITY, f64::NAN, -1.0, 1e17, 1e30] {
-            assert!(stamp(wrong).unwrap_err().what.contains("are believed"), "{wrong}");
+            assert!(stamp(wrong).unwrap_err().what.contains("are accepted"), "{wrong}");
         }
     }
 }

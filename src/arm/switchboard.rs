@@ -131,7 +131,7 @@ impl Switchboard {
         self.switch.put(self.outputs.room, on)
     }
 
-    /// Closes the gripper, or opens it: what it holds falls.
+    /// Closes the gripper, or opens it, which drops its component.
     pub fn grip(&mut self, closed: bool) -> Result<()> {
         self.switch.put(self.outputs.gripper, closed)
     }

@@ -1,6 +1,7 @@
-//! In: the address of a Universal Robots controller. Out: its poses, from the real-time interface (port 30003) that it streams by
-//! itself; it is read, nothing is sent.
-//! Frame and unit: metres and rotation vector on the wire, base_from_flange in mm here: the tool centre point must be the flange.
+//! In: the address of a Universal Robots controller. Out: its poses, from the real-time interface (port 30003) that
+//! it streams by itself; it is read, nothing is sent.
+//! Frame and unit: metres and rotation vector on the wire, base_from_flange in mm here: the tool centre point must be
+//! the flange.
 
 use super::state::stamp;
 use super::{Arm, Mode, PoseSource, State, TimedPose};
@@ -13,8 +14,8 @@ use std::time::{Duration, Instant};
 
 /// Longest silence of a stream that comes 125 or 500 times a second.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Where a packet has its time, its tool vector and its robot mode (big-endian doubles); packets of all controllers since
-/// version 3 begin alike and have so many bytes at least.
+/// Where a packet has its time, its tool vector and its robot mode (big-endian doubles); packets of all controllers
+/// since version 3 begin alike and have so many bytes at least.
 const TIME: usize = 4;
 const TOOL: usize = 444;
 const SHORTEST: usize = 812;

@@ -9,8 +9,8 @@ use std::path::PathBuf;
 /// Where a robot is.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RobotUri {
-    /// `bcap://HOST[:PORT][?network=udp][&full=MM_S][&turn=DEG_S]`: a Denso controller; `full` and `turn` are the speeds of straight motions at
-    /// 100 %.
+    /// `bcap://HOST[:PORT][?network=udp][&full=MM_S][&turn=DEG_S]`: a Denso controller; `full` and `turn` are the
+    /// speeds of straight motions at 100 %.
     Bcap {
         /// HOST:PORT.
         address: String,
@@ -31,7 +31,8 @@ pub enum RobotUri {
 const BCAP_PORT: u16 = 5007;
 /// The port of Universal Robots' real-time interface.
 const UR_PORT: u16 = 30_003;
-/// Straight motions at 100 %, mm/s. What the VS-060 does is to be measured; a motion that is faster than asked is halted.
+/// Straight motions at 100 %, mm/s. What the VS-060 does is to be measured; a motion that is faster than asked is
+/// halted.
 const FULL_MM_S: f64 = 1000.0;
 /// The same for turning, degrees/s.
 const FULL_DEG_S: f64 = 200.0;
@@ -49,7 +50,7 @@ impl std::str::FromStr for RobotUri {
             return if path.is_empty() { Err(bad("names no file".into())) } else { Ok(RobotUri::File(path.into())) };
         }
         let Some((scheme, rest)) = uri.split_once("://") else {
-            return Err(bad("is no robot's address".into()));
+            return Err(bad("is not a robot's address".into()));
         };
         let (host, query) = rest.split_once('?').unwrap_or((rest, ""));
         let host = host.strip_suffix('/').unwrap_or(host);
@@ -68,11 +69,11 @@ impl std::str::FromStr for RobotUri {
                         ("network", "udp") => network = Network::Udp,
                         ("full", v) => {
                             full_mm_s = within(v, 50.0, 20_000.0)
-                                .ok_or_else(|| bad(format!("full={v}, wanted 50 to 20000 mm/s")))?;
+                                .ok_or_else(|| bad(format!("full={v}; allowed: 50 to 20000 mm/s")))?;
                         }
                         ("turn", v) => {
                             full_deg_s = within(v, 10.0, 2000.0)
-                                .ok_or_else(|| bad(format!("turn={v}, wanted 10 to 2000 degrees/s")))?;
+                                .ok_or_else(|| bad(format!("turn={v}; allowed: 10 to 2000 degrees/s")))?;
                         }
                         _ => {
                             return Err(bad(format!(
@@ -84,7 +85,7 @@ impl std::str::FromStr for RobotUri {
                 Ok(RobotUri::Bcap { address: with_port(host, BCAP_PORT).map_err(bad)?, network, full_mm_s, full_deg_s })
             }
             "ur" => Ok(RobotUri::Ur(with_port(host, UR_PORT).map_err(bad)?)),
-            other => Err(bad(format!("'{other}' is no kind of link"))),
+            other => Err(bad(format!("unknown robot link '{other}'"))),
         }
     }
 }
@@ -95,7 +96,7 @@ fn with_port(host: &str, port: u16) -> std::result::Result<String, String> {
     match name.rsplit_once(':') {
         None => Ok(format!("{host}:{port}")),
         Some((_, p)) if p.parse::<u16>().is_ok_and(|p| p > 0) => Ok(host.to_owned()),
-        Some((_, p)) => Err(format!("'{p}' is no port, 1 to 65535 are")),
+        Some((_, p)) => Err(format!("'{p}' is not a port; allowed: 1 to 65535")),
     }
 }
 
@@ -130,8 +131,8 @@ mod tests {
         assert_eq!(read("bcap://[::1]").unwrap(), bcap("[::1]:5007", Network::Tcp, 1000.0));
         assert_eq!(read("file:a/poses.json").unwrap(), RobotUri::File("a/poses.json".into()));
         for (uri, says) in [
-            ("10.0.0.2", "no robot's address"),
-            ("http://rc8", "no kind of link"),
+            ("10.0.0.2", "not a robot's address"),
+            ("http://rc8", "unknown robot link"),
             ("bcap://", "no host"),
             ("bcap://rc8:70000", "no port"),
             ("bcap://rc8?speed=3", "speed=3"),

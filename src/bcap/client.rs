@@ -59,8 +59,8 @@ impl Client {
         Ok(client)
     }
 
-    /// Makes a call and waits for its answer. The inner result is the controller's: a value ([`Variant::Empty`] where the call
-    /// has none) or its refusal. Errors: silence, a closed connection, damage.
+    /// Makes a call and waits for its answer. The inner result is the controller's: a value ([`Variant::Empty`] where
+    /// the call has none) or its refusal. Errors: silence, a closed connection, damage.
     pub fn call(&mut self, call: Call, arguments: Vec<Variant>) -> Result<std::result::Result<Variant, Outcome>> {
         let request = self.exchange.begin(call, arguments)?;
         self.link.send(&request)?;

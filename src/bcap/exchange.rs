@@ -1,5 +1,5 @@
-//! In: one call after the other, and every frame that comes in. Out: the bytes to send, and what each frame is to the call.
-//! No I/O and no clock: who owns the socket decides when to repeat and when to give up.
+//! In: one call after the other, and every frame that comes in. Out: the bytes to send, and what each frame is to the
+//! call. No I/O and no clock: who owns the socket decides when to repeat and when to give up.
 //! Frame and unit: none. Rules as captured from Denso's client: docs/robots.md, b-CAP.
 
 use super::{Call, Frame, Outcome, Variant};

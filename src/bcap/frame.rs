@@ -1,11 +1,12 @@
 //! In: a stream of bytes, or a datagram. Out: whole b-CAP frames, requests and replies, and back to the same bytes.
-//! Layout: 0x01, length u32, serial u16, field 7 u16, call or HRESULT u32, argument count u16, arguments (each a length u32
-//! and a variant), 0x04. Frame and unit: bytes, little endian.
+//! Layout: 0x01, length u32, serial u16, field 7 u16, call or HRESULT u32, argument count u16, arguments (each a
+//! length u32 and a variant), 0x04. Frame and unit: bytes, little endian.
 
 use super::Variant;
 use crate::fault::{Fault, Result};
 
-/// Longest frame that is read. Poses, variables and texts of error lists have some hundred bytes; a longer claim is damage.
+/// Longest frame that is read. Poses, variables and texts of error lists have some hundred bytes; a longer claim is
+/// damage.
 pub const LARGEST_FRAME: usize = 1 << 20;
 
 const BEGIN: u8 = 1;
@@ -28,8 +29,8 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Reads one frame that fills `bytes`. Errors: lengths that disagree, missing first or last byte, arguments that cannot be
-    /// read ([`Variant::decode`]).
+    /// Reads one frame that fills `bytes`. Errors: lengths that disagree, missing first or last byte, arguments that
+    /// cannot be read ([`Variant::decode`]).
     pub fn decode(bytes: &[u8]) -> Result<Frame> {
         let length = length_of(bytes)?.unwrap_or(usize::MAX);
         if length != bytes.len() {
@@ -106,7 +107,7 @@ fn length_of(bytes: &[u8]) -> Result<Option<usize>> {
 
 fn spoilt(what: String) -> Fault {
     Fault::input(what)
-        .cause("damage on the way, or something else than b-CAP answers there")
+        .cause("damaged in transit, or the server there does not speak b-CAP")
         .next("check the address and the port (b-CAP: 5007)")
 }
 
@@ -151,9 +152,12 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(if std::env::var_os("SHEETLIGHT_LONG").is_some() { 100_000 } else { 1_000 }))]
+        #![proptest_config(ProptestConfig::with_cases(
+            if std::env::var_os("SHEETLIGHT_LONG").is_some() { 100_000 } else { 1_000 }
+        ))]
         #[test]
-        fn frames_come_back_from_any_pieces(frames in proptest::collection::vec(any_frame(), 1..5), piece in 1usize..40) {
+        fn frames_come_back_from_any_pieces(frames in proptest::collection::vec(any_frame(), 1..5),
+            piece in 1usize..40) {
             let bytes: Vec<u8> = frames.iter().flat_map(|f| f.encode().unwrap()).collect();
             let (mut splitter, mut seen) = (Splitter::default(), Vec::new());
             for part in bytes.chunks(piece) {
@@ -166,7 +170,8 @@ mod tests {
             prop_assert_eq!(splitter.waiting(), 0);
         }
         #[test]
-        fn damage_never_panics(frame in any_frame(), hits in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6)) {
+        fn damage_never_panics(frame in any_frame(),
+            hits in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6)) {
             let mut bytes = frame.encode().unwrap();
             for (at, byte) in hits {
                 let i = at.index(bytes.len());

@@ -7,8 +7,8 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream, ToSocketAddrs, UdpSocket};
 use std::time::{Duration, Instant};
 
-/// How frames travel. TCP unless the controller is set to UDP: there, all clients of Denso's library share one thread, so
-/// that a Halt waits for the motion.
+/// How frames travel. TCP unless the controller is set to UDP: there, all clients of Denso's library share one
+/// thread, so that a Halt waits for the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Network {
     /// A stream; frames of any length.
@@ -38,7 +38,7 @@ impl Link {
     pub fn open(address: &str, network: Network, patience: Duration) -> Result<Link> {
         let mut last = None;
         let all = address.to_socket_addrs().map_err(|e| {
-            Fault::input(format!("{address}: is no address: {e}"))
+            Fault::input(format!("{address}: is not an address: {e}"))
                 .cause("a misspelt name, or the port is missing")
                 .next("write HOST:PORT, for example 192.168.0.1:5007")
         })?;
@@ -94,8 +94,8 @@ impl Link {
         sent.map_err(|e| closed(self.address, &e))
     }
 
-    /// The next frame; `None` when `until` has come. A damaged datagram is passed over; a damaged stream is an error, because
-    /// its place is lost.
+    /// The next frame; `None` when `until` has come. A damaged datagram is passed over; a damaged stream is an error,
+    /// because its place is lost.
     pub fn receive(&mut self, until: Instant) -> Result<Option<Frame>> {
         let mut buffer = [0; 4096];
         loop {

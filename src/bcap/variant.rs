@@ -53,7 +53,8 @@ macro_rules! variants {
             fn write_numbers(&self, out: &mut Vec<u8>) {
                 match self {
                     $(Variant::$one(x) => { head($code, 1, out); x.write(out); })*
-                    $(Variant::$many(all) => { head($code | ARRAY, all.len(), out); all.iter().for_each(|x| x.write(out)); })*
+                    $(Variant::$many(all) => { head($code | ARRAY, all.len(),
+                        out); all.iter().for_each(|x| x.write(out)); })*
                     _ => unreachable!("written by its own rule"),
                 }
             }
@@ -323,13 +324,16 @@ pub(super) mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(if std::env::var_os("SHEETLIGHT_LONG").is_some() { 100_000 } else { 2_000 }))]
+        #![proptest_config(ProptestConfig::with_cases(
+            if std::env::var_os("SHEETLIGHT_LONG").is_some() { 100_000 } else { 2_000 }
+        ))]
         #[test]
         fn what_is_written_is_read(v in any_variant()) {
             prop_assert_eq!(Variant::decode(&bytes(&v)).unwrap(), v);
         }
         #[test]
-        fn spoilt_bytes_are_refused_or_read(v in any_variant(), at in any::<prop::sample::Index>(), byte: u8, cut in any::<prop::sample::Index>()) {
+        fn spoilt_bytes_are_refused_or_read(v in any_variant(), at in any::<prop::sample::Index>(), byte: u8,
+            cut in any::<prop::sample::Index>()) {
             let mut b = bytes(&v);
             let i = at.index(b.len());
             b[i] = byte;

@@ -1,5 +1,5 @@
-//! In: pictures a second. Out: what of a camera that sends so many the newest-picture chain measures, at half and at full resolution, counted
-//! while it runs: every picture stands under its own name.
+//! In: pictures a second. Out: what of a camera that sends so many the newest-picture chain measures, at half and at
+//! full resolution, counted while it runs: every picture stands under its own name.
 //! Frame and unit: px, pictures, ms from a picture's last byte to its points.
 
 use super::scenes::{Scene, pictures};
@@ -86,7 +86,7 @@ fn at((width, height): (u32, u32), rate_hz: f64, seconds: f64, place: Where) -> 
     let a = feed.account();
     if waits.is_empty() {
         return Err(Fault::refused(format!("no picture was measured in {seconds} s"))
-            .cause("at so few pictures a second none came in that time, or this machine is at a stand")
+            .cause("no picture came in that time at this rate, or this machine is overloaded")
             .next("measure for longer"));
     }
     Ok(KeptUp {

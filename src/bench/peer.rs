@@ -59,7 +59,8 @@ enum Command {
     /// As RunFull on this machine's processor, all pictures at once, or one after the other.
     RunHost(usize),
     RunHostSingly(usize),
-    /// x, y of the skeleton pixels of one picture and X, Y, Z of their points, little-endian f32, after their number in JSON.
+    /// x, y of the skeleton pixels of one picture and X, Y, Z of their points, little-endian f32, after their number
+    /// in JSON.
     Points(usize),
     /// The thresholded and the thinned mask of one picture, 0 and 255.
     Masks(usize),

@@ -1,4 +1,5 @@
-//! In: nothing. Out: times of a shot that were measured on other machines, as benches/runs keeps them: what this one stands among.
+//! In: nothing. Out: times of a shot that were measured on other machines, as benches/runs keeps them: what this one
+//! stands among.
 //! Frame and unit: ms a shot, one clean stripe.
 
 use super::ways::WayTime;

@@ -53,7 +53,8 @@ pub struct Row {
     pub full_ms_per_shot: Option<f64>,
     /// That against the skeleton alone, median of runs in turns.
     pub full_over_skeleton: Option<f64>,
-    /// Wall time a shot with the pictures already where the stages read them, results brought back; and of the full chain.
+    /// Wall time a shot with the pictures already where the stages read them, results brought back; and of the full
+    /// chain.
     pub device_ms_per_shot: f64,
     /// Wall time a shot of the full chain with the pictures already there, ms.
     pub full_device_ms_per_shot: Option<f64>,
@@ -67,8 +68,8 @@ pub struct Row {
     pub cpu_over_plain_read: Option<f64>,
     /// Bytes that the stages move a pixel, from the buffers' sizes and the listed tiles.
     pub bytes_per_px: f64,
-    /// Share of the memory ceiling that is reached, of all threads, or of the device's own memory with the pictures there; and
-    /// of the upload ceiling.
+    /// Share of the memory ceiling that is reached, of all threads, or of the device's own memory with the pictures
+    /// there; and of the upload ceiling.
     pub share_of_memory: f64,
     /// Share of the upload ceiling that is reached.
     pub share_of_upload: Option<f64>,

@@ -1,5 +1,6 @@
-//! In: times a shot at several picture sizes, and pictures with more and more lit pixels. Out: what a shot costs by itself
-//! and what every further pixel, or lit pixel, adds. Frame and unit: ms a shot, megapixels, per cent of the pixels.
+//! In: times a shot at several picture sizes, and pictures with more and more lit pixels. Out: what a shot costs by
+//! itself and what every further pixel, or lit pixel, adds. Frame and unit: ms a shot, megapixels, per cent of the
+//! pixels.
 
 use super::rows::Row;
 use super::scenes::{Scene, noisy};
@@ -32,8 +33,8 @@ pub struct Scaling {
 }
 
 impl Scaling {
-    /// Least squares of the relative deviations, so that short times count as much as long ones. `None` where the values
-    /// of x are fewer than two.
+    /// Least squares of the relative deviations, so that short times count as much as long ones. `None` where the
+    /// values of x are fewer than two.
     fn fit(what: String, unit: &'static str, points: &[(f64, f64)]) -> Option<Scaling> {
         // Of 1 = a / y + b x / y.
         let (mut aa, mut ab, mut bb, mut a1, mut b1) = (0.0, 0.0, 0.0, 0.0, 0.0);

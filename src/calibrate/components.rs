@@ -52,8 +52,8 @@ impl Components {
         Some(theta.to_vec())
     }
 
-    /// Solution of s θ = q with no component below its floor, and its likelihood's logarithm: where a component would be,
-    /// the signs do not tell which of them are nothing, and the likeliest of all ways is taken.
+    /// Solution of s θ = q with no component below its floor, and its likelihood's logarithm: where a component would
+    /// be, the signs do not tell which of them are nothing, and the likeliest of all ways is taken.
     fn likeliest(&self, s: &DMatrix<f64>, q: &DVector<f64>, floor: &[f64]) -> (f64, Vec<f64>) {
         let weighed = |theta: Vec<f64>| (self.likelihood(&theta).unwrap_or(f64::NEG_INFINITY), theta);
         let all = (1u32 << floor.len()) - 1;
@@ -87,7 +87,8 @@ const SAME: f64 = 1e-6;
 /// Shortest step: a thousandth of the scoring's.
 const HALVINGS: usize = 10;
 
-/// The components that `free` names (a bit each) with the others at their floor; `None` where one of them would lie below its own.
+/// The components that `free` names (a bit each) with the others at their floor; `None` where one of them would lie
+/// below its own.
 fn at_floor(s: &DMatrix<f64>, q: &DVector<f64>, floor: &[f64], free: u32) -> Option<Vec<f64>> {
     let (some, held): (Vec<usize>, Vec<usize>) = (0..floor.len()).partition(|a| free >> a & 1 == 1);
     let right =

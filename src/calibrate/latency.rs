@@ -1,5 +1,5 @@
-//! In: points of a part that was passed to and fro, each with the way it went a second. Out: by how much the pictures' times are late against
-//! the poses', so that both passes show one part.
+//! In: points of a part that was passed to and fro, each with the way it went a second. Out: by how much the
+//! pictures' times are late against the poses', so that both passes show one part.
 //! Frame and unit: the cloud's frame, mm; seconds.
 
 use crate::fault::{Fault, Result};
@@ -71,8 +71,8 @@ pub fn delay(shots: &[Vec<Passing>], up: &Vec3) -> Result<Delay> {
         passes.iter().flat_map(|a| passes.iter().map(move |b| (a, b))).filter(|(a, b)| a.forth && !b.forth).collect();
     if pairs.is_empty() {
         return Err(Fault::refused(format!("{} passes, all in one direction", passes.len()))
-            .cause("a delay shifts the part along the motion; only the way back shows by how much")
-            .next("record the same part to and fro"));
+            .cause("a delay shifts the part along the motion; only the way back shows the amount")
+            .next("record the same part back and forth"));
     }
     let spacing = spacing(&passes);
     // A step that shifts both passes by a quarter of the way between two shots.
@@ -88,7 +88,8 @@ pub fn delay(shots: &[Vec<Passing>], up: &Vec3) -> Result<Delay> {
     if all.is_empty() || total(&coarse[best].1) > DISTINCT * all[all.len() / 2] {
         return Err(flat());
     }
-    // Where the passes nearly agree their scatter is known: what differs by much more, edges and shadows, says nothing of a part of a step.
+    // Where the passes nearly agree their scatter is known: what differs by much more, edges and shadows, says
+    // nothing of a part of a step.
     let scale = (3.0 * scatter(&pairs, spacing, seconds)).clamp(FINEST, SCALE);
     let mut fine = Vec::new();
     for _ in 0..ROUNDS {
@@ -116,8 +117,8 @@ pub fn delay(shots: &[Vec<Passing>], up: &Vec3) -> Result<Delay> {
 
 fn flat() -> Fault {
     Fault::refused("the passes show no delay")
-        .cause("a flat part looks the same wherever it is, or the passes do not overlap")
-        .next("pass over a part with slopes, or with edges that lie slanted to the stripe")
+        .cause("a flat part looks the same everywhere, or the passes do not overlap")
+        .next("pass over a part with slopes, or with edges slanted to the stripe")
 }
 
 /// Direction of the motion and its largest speed.
@@ -131,7 +132,7 @@ fn main_way(shots: &[Vec<Passing>]) -> Result<(Vec3, f64)> {
             ways.len()
         ))
         .cause("a recording that was paired standing still, or without poses")
-        .next("record with --pair clock while the part is passed to and fro"));
+        .next("record with --pair clock while the part is passed back and forth"));
     }
     let spread: Matrix3<f64> = ways.iter().map(|v| v * v.transpose()).sum();
     let eigen = spread.symmetric_eigen();

@@ -140,7 +140,8 @@ impl MeasuredPose {
     pub fn centre(&self) -> Vec3 {
         self.camera_from_board.point(&self.landmarks[4])
     }
-    /// Its own factor where it fits far worse than usual, of a blurred picture or of another camera, else the usual one.
+    /// Its own factor where it fits far worse than usual, of a blurred picture or of another camera, else the usual
+    /// one.
     pub fn factor_among(&self, usual: f64) -> f64 {
         if self.sigma_factor > MISFIT * usual { self.sigma_factor } else { usual }
     }
@@ -194,7 +195,10 @@ pub fn measure(seen: &SeenBoard, camera: &Intrinsics, start: &Rigid<Camera, Boar
     let options = LmOptions { loss: Loss::Huber(2.5), estimate_scale: true, tolerance: 1e-11, ..LmOptions::default() };
     let found = lm(&problem, *start, &options).minimum().filter(|f| f.covariance.is_some()).ok_or_else(|| {
         Fault::refused(format!("{}: the board's pose is not determined by its pixels", seen.name))
-            .cause("the features lie on a line, the start was behind the camera, or the fit of the pose does not come to rest")
+            .cause(
+                "the features lie on a line, the start was behind the camera, or the fit of the pose does not \
+                    converge",
+            )
             .next("leave this picture out")
     })?;
     let pose = found.state;
@@ -252,8 +256,9 @@ pub fn measure_view(name: &str, camera: &Intrinsics, board: &BoardSpec, view: &B
     measure(&SeenBoard::from_view(name, board, view), camera, &start.camera_from_board)
 }
 
-/// One factor for all pictures: their residuals pooled by degrees of freedom; `None` where nothing tells it. A picture that fits
-/// more than three times as badly as the middle one, blurred or of another camera, does not speak for the others.
+/// One factor for all pictures: their residuals pooled by degrees of freedom; `None` where nothing tells it. A
+/// picture that fits more than three times as badly as the middle one, blurred or of another camera, does not speak
+/// for the others.
 pub fn pooled_factor<'a>(poses: impl Iterator<Item = &'a MeasuredPose>) -> Option<f64> {
     let poses: Vec<&MeasuredPose> = poses.filter(|p| p.freedom > 0.0).collect();
     let mut factors: Vec<f64> = poses.iter().map(|p| p.sigma_factor).collect();

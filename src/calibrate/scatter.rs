@@ -1,5 +1,6 @@
-//! In: how much more the pictures of a set scatter than their own sigmas say, and from how many degrees of freedom that is
-//! known. Out: by how much a stated variance is to grow; which pictures stand out; when the others may overrule them.
+//! In: how much more the pictures of a set scatter than their own sigmas say, and from how many degrees of freedom
+//! that is known. Out: by how much a stated variance is to grow; which pictures stand out; when the others may
+//! overrule them.
 //! Frame and unit: none; squared distances in sigmas.
 
 use super::limits::Judgement;
@@ -14,9 +15,9 @@ const FAR2: f64 = 9.0;
 /// Median of a chi-square with 2 degrees of freedom.
 const MEDIAN_OF_TWO: f64 = 2.0 * std::f64::consts::LN_2;
 
-/// The factor on the variance. The scatter itself is known from few pictures: three sigmas are to hold what three sigmas of
-/// Student's distribution do (its expansion at 3 [abramowitz72, 26.7.5]), coming in as the scatter leaves what chance
-/// explains. Three and four pictures hardly show whether they scatter: for them it is in full.
+/// The factor on the variance. The scatter itself is known from few pictures: three sigmas are to hold what three
+/// sigmas of Student's distribution do (its expansion at 3 [abramowitz72, 26.7.5]), coming in as the scatter leaves
+/// what chance explains. Three and four pictures hardly show whether they scatter: for them it is in full.
 pub fn inflation(scatter2: f64, freedom: f64) -> f64 {
     let n = freedom.max(1.0);
     let student = 1.0 + 2.5 / n + 5.75 / (n * n) + 10.1 / (n * n * n);
@@ -25,15 +26,15 @@ pub fn inflation(scatter2: f64, freedom: f64) -> f64 {
     scatter2.max(1.0) * (1.0 + (student - 1.0) * more.max(few)).powi(2)
 }
 
-/// The scatter with what was left out as far off as is not doubted, three sigmas (Winsor's variance \[tukey62\]): where some stand
-/// out, others may by less, unseen. `left_out` pictures of 2 degrees of freedom each.
+/// The scatter with what was left out as far off as is not doubted, three sigmas (Winsor's variance \[tukey62\]):
+/// where some stand out, others may by less, unseen. `left_out` pictures of 2 degrees of freedom each.
 pub fn winsorised(scatter2: f64, freedom: f64, left_out: usize) -> f64 {
     let (n, k) = (freedom.max(1.0), left_out as f64);
     if left_out == 0 { scatter2 } else { scatter2.max(1.0) * (n + FAR2 * k) / (n + 2.0 * k) }
 }
 
-/// Squared distances (2 degrees of freedom each) over what is usual among those that count, where that is more than chance:
-/// pictures that all scatter alike leave none out.
+/// Squared distances (2 degrees of freedom each) over what is usual among those that count, where that is more than
+/// chance: pictures that all scatter alike leave none out.
 pub fn beside(distances: &[f64], counts: impl Fn(usize) -> bool) -> Vec<f64> {
     let mut sorted: Vec<f64> = (0..distances.len()).filter(|i| counts(*i)).map(|i| distances[i]).collect();
     sorted.sort_by(f64::total_cmp);

@@ -38,9 +38,9 @@ pub struct FlatCheck {
     pub own_rms_mm: f64,
 }
 
-/// The plane of most points, by least median of distances over drawn triples \[rousseeuw84\]: a scan that reaches over the
-/// plate's edge holds the table beside it too. 200 draws hit the plate where it is 40 % of the points or more in all but
-/// one case of 400,000.
+/// The plane of most points, by least median of distances over drawn triples \[rousseeuw84\]: a scan that reaches
+/// over the plate's edge holds the table beside it too. 200 draws hit the plate where it is 40 % of the points or
+/// more in all but one case of 400,000.
 fn start(points: &[Vec3]) -> Option<Plane<Base>> {
     let mut rng = rand_pcg::Pcg64::seed_from_u64(1);
     let step = points.len().div_ceil(2000).max(1);

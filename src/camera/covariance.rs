@@ -6,8 +6,8 @@ use crate::fault::{Fault, Result};
 use crate::geometry::not_a_covariance;
 use nalgebra::DMatrix;
 
-/// Covariance of a camera's numbers: rows and columns in the order of [`NAMES`] (fx fy cx cy, the lens's terms, skew), units
-/// multiplied. Finite, symmetric, positive semidefinite; a parameter without variance counts as known.
+/// Covariance of a camera's numbers: rows and columns in the order of [`NAMES`] (fx fy cx cy, the lens's terms,
+/// skew), units multiplied. Finite, symmetric, positive semidefinite; a parameter without variance counts as known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraCovariance(ParameterMatrix);
 

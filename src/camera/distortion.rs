@@ -1,6 +1,7 @@
-//! In: a lens's fourteen terms in OpenCV's order. Out: where a ray lands on the sensor, the derivatives, and the way back
-//! (docs/math.md, Camera (5) to (8)).
-//! Frame and unit: normalised image coordinates (x/z, y/z) and what the lens and a tilted sensor make of them; tau in rad.
+//! In: a lens's fourteen terms in OpenCV's order. Out: where a ray lands on the sensor, the derivatives, and the way
+//! back (docs/math.md, Camera (5) to (8)).
+//! Frame and unit: normalised image coordinates (x/z, y/z) and what the lens and a tilted sensor make of them; tau in
+//! rad.
 
 use crate::geometry::{Mat3, Vec2, Vec3};
 use nalgebra::{Matrix2, SMatrix};
@@ -8,8 +9,8 @@ use nalgebra::{Matrix2, SMatrix};
 /// How many terms there are.
 pub const TERMS: usize = 14;
 
-/// k1 k2 p1 p2 k3 (Brown-Conrady), k4 k5 k6 (rational), s1 s2 s3 s4 (thin prism), tau_x tau_y (tilted sensor) in OpenCV's
-/// order, signs and units.
+/// k1 k2 p1 p2 k3 (Brown-Conrady), k4 k5 k6 (rational), s1 s2 s3 s4 (thin prism), tau_x tau_y (tilted sensor) in
+/// OpenCV's order, signs and units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Distortion(pub [f64; TERMS]);
 
@@ -139,7 +140,8 @@ impl Distortion {
         by
     }
 
-    /// Sensor coordinates to ideal ones, to 1e-12. `None` outside the region round the axis in which the lens is one to one.
+    /// Sensor coordinates to ideal ones, to 1e-12. `None` outside the region round the axis in which the lens is one
+    /// to one.
     pub fn undistort(&self, d: &Vec2) -> Option<Vec2> {
         let flat = match self.tilt() {
             Some([t, ..]) => Some(projected(&t.try_inverse()?, d)).filter(|p| p.x.is_finite() && p.y.is_finite())?,
@@ -183,7 +185,8 @@ impl Distortion {
     }
 }
 
-/// True where nothing is folded over: beyond two folds the determinant is positive again, the picture turned by half a turn.
+/// True where nothing is folded over: beyond two folds the determinant is positive again, the picture turned by half
+/// a turn.
 fn upright(j: &Matrix2<f64>) -> bool {
     j.determinant() > 0.0 && j.trace() > 0.0
 }
@@ -199,7 +202,8 @@ fn projected_jacobian(t: &Mat3, p: &Vec2) -> Matrix2<f64> {
     (t.fixed_view::<2, 2>(0, 0) - at * t.fixed_view::<1, 2>(2, 0)) / v.z
 }
 
-/// P(R) R with R = R_y(tau_y) R_x(tau_x), P projecting along the axis back on the tilted plane, and the derivatives by both.
+/// P(R) R with R = R_y(tau_y) R_x(tau_x), P projecting along the axis back on the tilted plane, and the derivatives
+/// by both.
 fn tilt(tau_x: f64, tau_y: f64) -> [Mat3; 3] {
     let ((sx, cx), (sy, cy)) = (tau_x.sin_cos(), tau_y.sin_cos());
     let about_x = Mat3::new(1.0, 0.0, 0.0, 0.0, cx, sx, 0.0, -sx, cx);

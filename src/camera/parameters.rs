@@ -1,4 +1,5 @@
-//! In: a camera. Out: its parameters as one vector under names, which calibration files, covariances and derivatives share.
+//! In: a camera. Out: its parameters as one vector under names, which calibration files, covariances and derivatives
+//! share.
 //! Frame and unit: px and the lens's own; each name ends with its unit.
 
 use super::distortion::{Distortion, TERMS};
@@ -40,7 +41,8 @@ pub const ALWAYS_NAMED: usize = 9;
 
 /// A camera's numbers in the order of [`NAMES`], each in the unit that its name ends with.
 pub type Parameters = SVector<f64, PARAMETERS>;
-/// A square of them: rows and columns in the order of [`NAMES`]. What is known to be a covariance is a [`super::CameraCovariance`].
+/// A square of them: rows and columns in the order of [`NAMES`]. What is known to be a covariance is a
+/// [`super::CameraCovariance`].
 pub type ParameterMatrix = SMatrix<f64, PARAMETERS, PARAMETERS>;
 
 impl Intrinsics {

@@ -115,7 +115,8 @@ fn any_lens() -> impl Strategy<Value = Distortion> {
     })
 }
 
-/// Newton's method jumps over both folds of this lens, radial and tangential, to where its determinant is positive again.
+/// Newton's method jumps over both folds of this lens, radial and tangential, to where its determinant is positive
+/// again.
 #[test]
 fn what_is_turned_by_half_a_turn_beyond_two_folds_is_no_ray() {
     let lens = Distortion::from([0.2452318549799642, 0.11399441860892635, 0.0, 0.0, -0.03042951380470863]);
@@ -125,8 +126,8 @@ fn what_is_turned_by_half_a_turn_beyond_two_folds_is_no_ray() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
-    /// Inside the region round the axis where the lens is one to one, to its very edge, there and back is the same ray; and
-    /// what is answered at all is a ray of that region.
+    /// Inside the region round the axis where the lens is one to one, to its very edge, there and back is the same
+    /// ray; and what is answered at all is a ray of that region.
     #[test]
     fn lenses_are_inverted_where_they_are_one_to_one(lens in any_lens(), x in -1.1f64..1.1, y in -1.1f64..1.1) {
         let n = Vec2::new(x, y);
@@ -169,7 +170,8 @@ proptest! {
     }
     /// Binned and cut-out pictures see the same rays, whatever the lens.
     #[test]
-    fn scaling_and_cutting_keep_the_rays(lens in any_lens(), u in 60.0f64..580.0, v in 60.0f64..420.0, left in 0u32..64, top in 0u32..64) {
+    fn scaling_and_cutting_keep_the_rays(lens in any_lens(), u in 60.0f64..580.0, v in 60.0f64..420.0,
+        left in 0u32..64, top in 0u32..64) {
         let whole = Intrinsics { distortion: lens, fx: 900.0, fy: 897.0, skew: 0.3, ..paper() };
         let fine = whole.scaled_to(1920, 960);
         let part = whole.region(f64::from(left), f64::from(top), 512, 400);

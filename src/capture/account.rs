@@ -1,5 +1,5 @@
-//! In: the numbers of pictures as they come, incomplete ones, outages. Out: an account in which every picture that the camera sent
-//! stands under its own name.
+//! In: the numbers of pictures as they come, incomplete ones, outages. Out: an account in which every picture that
+//! the camera sent stands under its own name.
 //! Frame and unit: pictures.
 
 use super::clock::now_ns;
@@ -7,7 +7,8 @@ use super::clock::now_ns;
 /// What became of every picture that the camera says it sent.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Account {
-    /// What the camera says it sent, or took: by its own counter, or by its numbers. With what an outage is reckoned to have cost.
+    /// What the camera says it sent, or took: by its own counter, or by its numbers. With what an outage is reckoned
+    /// to have cost.
     pub sent: u64,
     /// Came whole and in order.
     pub complete: u64,
@@ -175,8 +176,8 @@ impl Ledger {
         }
     }
 
-    /// What an outage cost: the numbers in between where the device counted on, else the time since the last picture at the
-    /// usual rate.
+    /// What an outage cost: the numbers in between where the device counted on, else the time since the last picture
+    /// at the usual rate.
     fn back(&mut self, id: u64, host_ns: u64) {
         if !std::mem::take(&mut self.gone) {
             return;

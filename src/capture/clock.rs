@@ -1,19 +1,19 @@
-//! In: the system's clock. Out: the host's time, which runs evenly while the program runs; what another clock said between two
-//! of its moments; how one clock runs against the other.
+//! In: the system's clock. Out: the host's time, which runs evenly while the program runs; what another clock said
+//! between two of its moments; how one clock runs against the other.
 //! Frame and unit: ns; the host's time counts from the Unix epoch.
 
 use std::collections::VecDeque;
 use std::sync::OnceLock;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-/// The host's time, ns since the Unix epoch. The system's clock is asked once; from then on the steady one counts, so that
-/// nobody who sets the clock makes time jump.
+/// The host's time, ns since the Unix epoch. The system's clock is asked once; from then on the steady one counts, so
+/// that nobody who sets the clock makes time jump.
 pub fn now_ns() -> u64 {
     ns_of(Instant::now())
 }
 
-/// A moment of the steady clock as the host's time, ns since the Unix epoch. The order and the distance of moments stay as they are,
-/// whatever happens between the reading of a clock and this.
+/// A moment of the steady clock as the host's time, ns since the Unix epoch. The order and the distance of moments
+/// stay as they are, whatever happens between the reading of a clock and this.
 pub fn ns_of(moment: Instant) -> u64 {
     static START: OnceLock<(u64, Instant)> = OnceLock::new();
     let (epoch, began) = START.get_or_init(|| {
@@ -63,8 +63,8 @@ struct Reading {
     half: f64,
 }
 
-/// How another clock runs against the host's: by the shortest round trips, or, where it cannot be asked, by the earliest arrivals
-/// (then the shortest delay of the way is part of the offset).
+/// How another clock runs against the host's: by the shortest round trips, or, where it cannot be asked, by the
+/// earliest arrivals (then the shortest delay of the way is part of the offset).
 #[derive(Clone, Debug, Default)]
 pub struct ClockMap {
     best: VecDeque<Reading>,
@@ -151,8 +151,8 @@ impl ClockMap {
         self.jumps
     }
 
-    /// When the other clock said this, by the host's, of something that was here at `here_ns`: `None` where the clock has not been read
-    /// since, so that it may have jumped; `Err` where it did.
+    /// When the other clock said this, by the host's, of something that was here at `here_ns`: `None` where the clock
+    /// has not been read since, so that it may have jumped; `Err` where it did.
     pub fn told(&self, there_ns: u64, here_ns: u64) -> Option<Result<Moment, String>> {
         if here_ns <= self.unsure_until {
             return Some(Err("the camera's clock jumped around it".into()));

@@ -1,4 +1,5 @@
-//! In: how long each picture took from its last byte to its points. Out: median and 99th percentile, in memory that does not grow.
+//! In: how long each picture took from its last byte to its points. Out: median and 99th percentile, in memory that
+//! does not grow.
 //! Frame and unit: ms.
 
 /// Classes a hundredth wide, from a microsecond to a thousand seconds.

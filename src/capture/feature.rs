@@ -1,5 +1,6 @@
 //! In: what a camera lets be set. Out: its names, values, units and ranges.
-//! Frame and unit: as the GenICam Standard Features Naming Convention has them: ExposureTime in us, Gain in dB, lengths in px.
+//! Frame and unit: as the GenICam Standard Features Naming Convention has them: ExposureTime in us, Gain in dB,
+//! lengths in px.
 
 /// What a feature can be.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]

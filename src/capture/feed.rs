@@ -1,5 +1,5 @@
-//! In: a source, a mode. Out: its pictures through a bounded queue, while a thread of its own asks for them; an account of all of them; a camera
-//! that went away and came back.
+//! In: a source, a mode. Out: its pictures through a bounded queue, while a thread of its own asks for them; an
+//! account of all of them; a camera that went away and came back.
 //! Frame and unit: pictures, bytes; times in ns.
 
 use super::account::{Account, Ledger, Order};

@@ -1,4 +1,5 @@
-//! In: how raw frames are laid out in words, a reader of their bytes. Out: their size and depth; one picture after another.
+//! In: how raw frames are laid out in words, a reader of their bytes. Out: their size and depth; one picture after
+//! another.
 //! Frame and unit: pixels; grey levels of the sensor's depth, those of more than 8 bits as two bytes, little endian.
 
 use crate::camera::Readout;

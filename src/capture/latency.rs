@@ -1,4 +1,5 @@
-//! In: a station's folder. Out: by how much its pictures' times are late against its poses', as it was calibrated, of which camera and which poses.
+//! In: a station's folder. Out: by how much its pictures' times are late against its poses', as it was calibrated, of
+//! which camera and which poses.
 //! Frame and unit: ms.
 
 use crate::fault::{Fault, Result};
@@ -47,7 +48,8 @@ impl Latency {
         Ok(Some(latency))
     }
 
-    /// Whether it is the delay between this camera and these poses. Where one of both does not say what it is of, it is believed.
+    /// Whether it is the delay between this camera and these poses. Where one of both does not say what it is of, it
+    /// is believed.
     ///
     /// # Errors
     /// It is of another camera, or of another robot's or axis' poses.

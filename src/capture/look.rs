@@ -212,7 +212,8 @@ impl std::fmt::Display for Look {
         let along: Vec<String> = s.along.iter().map(|p| format!("{:.0}", 100.0 * p)).collect();
         write!(
             f,
-            "stripe ({}): peaks at {:.0} % of full scale, {:.2} % of them saturated, {:.1} px wide, contrast {:.0}, dark {:.1} %; along it {} %",
+            "stripe ({}): peaks at {:.0} % of full scale, {:.2} % of them saturated, {:.1} px wide, contrast {:.0}, \
+             dark {:.1} %; along it {} %",
             if s.lying { "lying" } else { "upright" },
             100.0 * s.peak,
             100.0 * s.saturated,

@@ -1,5 +1,7 @@
-//! In: a camera, or whatever stands for one. Out: its pictures with id and times, and what became of those that did not come.
-//! Frame and unit: times in ns, the device's by its own clock, the host's by [`super::now_ns`]; grey levels of the sensor's depth.
+//! In: a camera, or whatever stands for one. Out: its pictures with id and times, and what became of those that did
+//! not come.
+//! Frame and unit: times in ns, the device's by its own clock, the host's by [`super::now_ns`]; grey levels of the
+//! sensor's depth.
 
 use super::clock::RoundTrip;
 use super::feature::Feature;
@@ -15,8 +17,8 @@ use std::time::Duration;
 pub struct Picture {
     /// Grey levels of the sensor's depth.
     pub image: Image,
-    /// The device's number of it: one more for every picture that the device took, so that gaps are pictures that were lost.
-    /// Where the device counts nothing, those that came are counted.
+    /// The device's number of it: one more for every picture that the device took, so that gaps are pictures that
+    /// were lost. Where the device counts nothing, those that came are counted.
     pub id: u64,
     /// When its exposure began, by the device's own clock; none where the device says nothing.
     pub device_ns: Option<u64>,
@@ -26,7 +28,8 @@ pub struct Picture {
     pub exposure_ns: Option<u64>,
     /// The encoder's or trigger's count that the camera sent along with it (chunk data).
     pub count: Option<i64>,
-    /// Where what moves stood in the middle of the exposure, of a source that knows: a recording that is played, a simulated station.
+    /// Where what moves stood in the middle of the exposure, of a source that knows: a recording that is played, a
+    /// simulated station.
     pub stand: Option<Stand>,
 }
 
@@ -62,8 +65,8 @@ pub enum Event {
     Ended,
 }
 
-/// A source of pictures. It starts when it is opened, and is asked on one thread; pictures come at its own pace and in its own
-/// order, and are lost where nobody asks in time (which their ids show).
+/// A source of pictures. It starts when it is opened, and is asked on one thread; pictures come at its own pace and
+/// in its own order, and are lost where nobody asks in time (which their ids show).
 pub trait PictureSource: Send {
     /// Size and depth of all its pictures.
     fn format(&self) -> Format;
@@ -84,7 +87,8 @@ pub trait PictureSource: Send {
         Ok(false)
     }
 
-    /// How many pictures the device says it has sent since it was opened; none where it does not say: then the ids tell.
+    /// How many pictures the device says it has sent since it was opened; none where it does not say: then the ids
+    /// tell.
     fn sent(&self) -> Option<u64> {
         None
     }
@@ -135,7 +139,7 @@ pub trait PictureSource: Send {
     fn set(&mut self, name: &str, value: &str) -> Result<()> {
         let _ = value;
         Err(Fault::usage(format!("{name}: this source has no features to set"))
-            .cause("a pipe, a folder or a file is no camera")
+            .cause("a pipe, a folder or a file is not a camera")
             .next("set it in the program that fills it"))
     }
 

@@ -1,4 +1,5 @@
-//! In: a feed, a way to pair. Out: shots in order, each with where things stood; what was left out, listed; the account.
+//! In: a feed, a way to pair. Out: shots in order, each with where things stood; what was left out, listed; the
+//! account.
 //! Frame and unit: as [`super::pair`].
 
 use super::account::Account;
@@ -19,7 +20,7 @@ pub enum Streamed {
     Ended(Option<Fault>),
 }
 
-/// Pictures left out that are kept by name; of more only the number is.
+/// Excluded pictures that are kept by name; of more only the number is.
 const LISTED: usize = 10_000;
 /// How long is slept where pictures wait for a pose.
 const GLANCE: Duration = Duration::from_millis(4);

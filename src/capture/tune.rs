@@ -1,4 +1,5 @@
-//! In: a camera whose pictures show a stripe. Out: pictures that were exposed after a moment; the exposure that suits the stripe.
+//! In: a camera whose pictures show a stripe. Out: pictures that were exposed after a moment; the exposure that suits
+//! the stripe.
 //! Frame and unit: exposure in us; shares of full scale; the device's time in ns.
 
 use super::feature::{Range, Value};
@@ -60,7 +61,7 @@ impl<'a> Fresh<'a> {
             }
         }
         Err(Fault::input(format!("{}: no picture within {:.0} s", self.source.name(), self.patience.as_secs_f64()))
-            .cause("it waits for a trigger, or its packets do not come through (packet size, firewall)")
+            .cause("it waits for a trigger, or its packets are lost (packet size, firewall)")
             .next("see TriggerMode: sheetlight camera show; or try gige://...?packet=1500"))
     }
 }
@@ -101,8 +102,8 @@ const CAREFUL: f64 = WANTED[0] + 0.02;
 /// Finds the exposure at which the stripe's peak is right, and leaves it set.
 ///
 /// # Errors
-/// A source without ExposureTime; no stripe at any exposure; a stripe too bright or too dark at the ends of its range; one whose glints
-/// saturate while the rest is dark.
+/// A source without ExposureTime; no stripe at any exposure; a stripe too bright or too dark at the ends of its
+/// range; one whose glints saturate while the rest is dark.
 pub fn tune(source: &mut dyn PictureSource, mut tried: impl FnMut(f64, &Look)) -> Result<Tuned> {
     let (name, [low, high], mut exposure_us) = exposure(source)?;
     let mut bounds = Bounds::default();
@@ -137,7 +138,7 @@ fn changes(what: String) -> Fault {
 pub fn unexposed(name: &str) -> Fault {
     Fault::usage(format!("{name}: has no ExposureTime to set"))
         .cause("a pipe, a folder, a file, or a camera whose exposure is set elsewhere")
-        .next("set the exposure there; sheetlight camera snap says how the stripe looks")
+        .next("set the exposure there; sheetlight camera snap reports the stripe")
 }
 
 /// The feature's name, its range, its value.
@@ -171,8 +172,9 @@ fn judged(source: &mut dyn PictureSource) -> Result<Look> {
     Ok(look_at(&images))
 }
 
-/// Neither side is right: the brightest exposure that saturates nothing. Which of two so near each other shows five of a thousand peaks
-/// saturated and which shows six is chance: it goes down by small steps before the light is said to change.
+/// Neither side is right: the brightest exposure that saturates nothing. Which of two so near each other shows five
+/// of a thousand peaks saturated and which shows six is chance: it goes down by small steps before the light is said
+/// to change.
 fn settle(
     source: &mut dyn PictureSource,
     name: &str,
@@ -204,7 +206,8 @@ fn settled(dark: f64, bright: f64, seen: Look) -> Result<Tuned> {
     };
     let most = 100.0 * MOST_SATURATED;
     let said = format!(
-        "peaks stand at {:.0} % of full scale at {dark:.0} us, and at {bright:.0} us more than {most} % of them are saturated",
+        "peaks stand at {:.0} % of full scale at {dark:.0} us, and at {bright:.0} us more than {most} % of them are \
+         saturated",
         100.0 * peak
     );
     if peak < DIMMEST {
@@ -269,9 +272,9 @@ mod tests {
     use crate::capture::{Format, Picture, RoundTrip};
     use std::collections::VecDeque;
 
-    /// Pictures of 100x80 at 50 a second by its own clock; `waiting` of them are always under way, so that those that come after a setting
-    /// were exposed long before it. One line of `glint` shines `glints` times as bright, in each picture by up to a share of `flicker` more or
-    /// less: what counting noise does to it.
+    /// Pictures of 100x80 at 50 a second by its own clock; `waiting` of them are always under way, so that those that
+    /// come after a setting were exposed long before it. One line of `glint` shines `glints` times as bright, in each
+    /// picture by up to a share of `flicker` more or less: what counting noise does to it.
     struct Late {
         exposure_us: f64,
         ns: u64,

@@ -178,7 +178,7 @@ fn options<'a, const N: usize>(query: &'a str, keys: [&str; N]) -> Said<[Option<
 
 fn number(key: &str, text: Option<&str>, usual: f64) -> Said<f64> {
     let Some(text) = text else { return Ok(usual) };
-    text.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| format!("{key}={text} is no number"))
+    text.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| format!("{key}={text} is not a number"))
 }
 
 fn depth(text: Option<&str>) -> Said<u8> {
@@ -199,7 +199,7 @@ impl CameraUri {
         Ok(match self {
             CameraUri::Input => {
                 let raw = raw.ok_or_else(|| {
-                    Fault::usage("frames on standard input, and nobody says what they are like")
+                    Fault::usage("frames on standard input, but --raw does not state their format")
                         .next("state it: --raw 640x480:gray8")
                 })?;
                 Box::new(Pipe::new(raw, "standard input", std::io::stdin())?)

@@ -1,8 +1,9 @@
-//! In: messages of a cell's camera, or the bytes of a stream of them. Out: the other one. Pure: nothing here waits or allocates by
-//! what a length claims.
+//! In: messages of a cell's camera, or the bytes of a stream of them. Out: the other one. Pure: nothing here waits or
+//! allocates by what a length claims.
 //! Frame and unit: little endian; times in ns of the cell's clock.
 //!
-//! The server (the cell) sends messages, the client (we) lines of text. A message is a head of 16 bytes and its content:
+//! The server (the cell) sends messages, the client (we) lines of text. A message is a head of 16 bytes and its
+//! content:
 //!
 //! | bytes | what |
 //! |---|---|

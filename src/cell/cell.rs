@@ -1,4 +1,5 @@
-//! In: options. Out: a robot cell that exists only here: time, arm, outputs, camera, truth. Everything else talks to it.
+//! In: options. Out: a robot cell that exists only here: time, arm, outputs, camera, truth. Everything else talks to
+//! it.
 //! Frame and unit: base frame, mm; s of the cell.
 
 use super::camera::{self, Exposure, Lit};
@@ -170,7 +171,8 @@ impl Cell {
         }
     }
 
-    /// What hangs on an output stays on or off, whatever the output says: a wire is off, a relay is welded. `None`: it follows.
+    /// What hangs on an output stays on or off, whatever the output says: a wire is off, a relay is welded. `None`:
+    /// it follows.
     pub fn stick(&self, number: u16, at: Option<bool>) {
         let mut stuck = self.0.stuck.lock().unwrap_or_else(PoisonError::into_inner);
         match at {
@@ -224,7 +226,8 @@ impl Cell {
         Ok(())
     }
 
-    /// A person moves the arm with the pendant until the sensor looks at a place of the scene, or of the calibration board.
+    /// A person moves the arm with the pendant until the sensor looks at a place of the scene, or of the calibration
+    /// board.
     ///
     /// # Errors
     /// The arm moves, there is no such place, or it is out of reach.
@@ -242,7 +245,8 @@ impl Cell {
                 return Err(Fault::usage("there is no calibration board in this cell").next("start it with one"));
             }
         };
-        // Sideways from where the arm stood when the cell was started; over the board also down, until stripe and spot are on it.
+        // Sideways from where the arm stood when the cell was started; over the board also down, until stripe and
+        // spot are on it.
         let start = START_DEG.map(f64::to_radians);
         let mut flange = world.drawn().forward(&start);
         let camera = flange * self.0.station.flange_from_camera;
@@ -316,13 +320,14 @@ impl Cell {
     }
 }
 
-/// The scene's axes as the camera of the design has them where it looks straight down: x along the picture's rows, z up.
+/// The scene's axes as the camera of the design has them where it looks straight down: x along the picture's rows, z
+/// up.
 fn scene_in(design: &Station) -> Mat3 {
     design.flange_from_camera.rotation * Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0))
 }
 
-/// Where the scene lies: below the sensor as the arm starts, twice as far as it works, aside, turned and tilted a little,
-/// another way for each seed.
+/// Where the scene lies: below the sensor as the arm starts, twice as far as it works, aside, turned and tilted a
+/// little, another way for each seed.
 fn place(station: &Station, tilt_deg: f64) -> Rigid<Base, InScene> {
     let mut rng = station.rng("cell place", 0);
     let mut within = |by: f64| if station.seed == 0 { 0.0 } else { rng.random_range(-by..=by) };
@@ -359,7 +364,8 @@ fn on_flange() -> Rigid<Flange, InScene> {
     Rigid::new(Mat3::identity(), Vec3::z() * PLATE_MM - Vec3::from(BOARD_BESIDE_MM))
 }
 
-/// The sensor as it stands: the flange, as the arm begins, holds the board before it as a sensor on the flange would have it below.
+/// The sensor as it stands: the flange, as the arm begins, holds the board before it as a sensor on the flange would
+/// have it below.
 fn stand(
     options: &CellOptions,
     station: &Station,

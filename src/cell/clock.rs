@@ -1,5 +1,5 @@
-//! In: how fast the cell's time goes. Out: the cell's time; it stands still while a picture is being made that nobody has to
-//! wait for in a real cell.
+//! In: how fast the cell's time goes. Out: the cell's time; it stands still while a picture is being made that nobody
+//! has to wait for in a real cell.
 //! Frame and unit: s of the cell since it was started.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};

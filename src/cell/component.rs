@@ -1,5 +1,7 @@
-//! In: a part of the scene with holes. Out: the component that goes into it, and the gripper that holds it, as boxes and pins.
-//! Frame and unit: tool frame: origin where the component's underside meets the socket's top, z against the insertion; mm.
+//! In: a part of the scene with holes. Out: the component that goes into it, and the gripper that holds it, as boxes
+//! and pins.
+//! Frame and unit: tool frame: origin where the component's underside meets the socket's top, z against the
+//! insertion; mm.
 
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec3;

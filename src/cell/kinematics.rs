@@ -1,5 +1,7 @@
-//! In: joint angles or a flange pose. Out: the other one, for a Denso VS-060 as it is drawn or as one specimen was built.
-//! Frame and unit: base_from_flange, mm; joints rad. Chain, limits and speeds: Denso's robot description of the VS060A3.
+//! In: joint angles or a flange pose. Out: the other one, for a Denso VS-060 as it is drawn or as one specimen was
+//! built.
+//! Frame and unit: base_from_flange, mm; joints rad. Chain, limits and speeds: Denso's robot description of the
+//! VS060A3.
 
 use crate::geometry::{Base, Flange, Rigid, Vec3};
 use rs_opw_kinematics::glam::{DMat3, DQuat, DVec3};
@@ -16,7 +18,8 @@ const LIMITS: [[f64; 2]; 6] =
     [[-170.0, 170.0], [-120.0, 120.0], [-125.0, 155.0], [-270.0, 270.0], [-120.0, 120.0], [-360.0, 360.0]];
 /// Degrees a second.
 pub const SPEEDS: [f64; 6] = [213.75, 142.5, 155.58, 213.75, 164.47, 342.0];
-/// Joint 5 nearer to 0 than this, rad: joints 4 and 6 turn against each other, and a straight motion may need any speed.
+/// Joint 5 nearer to 0 than this, rad: joints 4 and 6 turn against each other, and a straight motion may need any
+/// speed.
 const SINGULAR: f64 = 2e-3;
 
 /// Why a pose cannot be had.
@@ -118,8 +121,8 @@ pub fn out_of_limits(joints: &Joints) -> u8 {
     joints.iter().zip(&LIMITS).enumerate().map(|(k, pair)| u8::from(out(pair)) << k).sum()
 }
 
-/// A number for shoulder, elbow and wrist: 5 where the arm reaches forwards, elbow up, joint 5 positive. Our own numbering; it
-/// changes where a controller's changes.
+/// A number for shoulder, elbow and wrist: 5 where the arm reaches forwards, elbow up, joint 5 positive. Our own
+/// numbering; it changes where a controller's changes.
 pub fn figure(joints: &Joints) -> i32 {
     // Reach of the wrist's centre before joint 1's axis, in units of the upper arm.
     let forwards = 305.0 * joints[1].sin() + 300.0 * (joints[1] + joints[2]).sin() >= 0.0;

@@ -1,5 +1,5 @@
-//! In: a scene and a seed. Out: a robot cell that exists only here: arm, controller, camera, lasers, gripper, at the level of
-//! their wires; and its judge.
+//! In: a scene and a seed. Out: a robot cell that exists only here: arm, controller, camera, lasers, gripper, at the
+//! level of their wires; and its judge.
 //! Frame and unit: base frame; mm, radians; s of the cell's own time.
 
 mod camera;

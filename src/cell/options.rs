@@ -15,7 +15,8 @@ pub struct CellOptions {
     pub board: Option<BoardSpec>,
     /// The arm begins over the board, as an operator jogs it there to calibrate; else over the scene.
     pub over_board: bool,
-    /// The sensor stands still and the flange carries board and scene before it, as for a sensor that is fixed in the cell.
+    /// The sensor stands still and the flange carries board and scene before it, as for a sensor that is fixed in the
+    /// cell.
     pub eye_to_hand: bool,
     /// The design of the sensor.
     pub rig: RigSpec,
@@ -69,14 +70,15 @@ impl CellOptions {
     /// Refuses numbers out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         if self.over_board && self.board.is_none() {
-            return Err(Fault::usage("the arm is to begin over the board, and there is no board")
+            return Err(Fault::usage("the arm shall begin over the board, but there is no board")
                 .next("name one with --board (sheetlight board writes it)"));
         }
         if self.eye_to_hand && (self.board.is_none() || self.over_board) {
             return Err(Fault::usage(
-                "the flange is to carry a board before the sensor, and there is none or the arm is to begin over it",
+                "the flange shall carry a board before the sensor, but no board is given or the arm shall begin over \
+                 it",
             )
-            .next("name a board, and let the arm begin where it begins"));
+            .next("give a board, and omit --over-board"));
         }
         let limits = [
             ("speed", self.speed, 0.1, 1000.0),

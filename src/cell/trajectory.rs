@@ -1,5 +1,5 @@
-//! In: joints at the start, a pose or joints at the end, speeds. Out: where the joints are at any time of the motion, speed
-//! and acceleration limited; or why it cannot be made.
+//! In: joints at the start, a pose or joints at the end, speeds. Out: where the joints are at any time of the motion,
+//! speed and acceleration limited; or why it cannot be made.
 //! Frame and unit: base_from_flange, mm; joints rad; times s from the motion's start.
 
 use super::kinematics::{Joints, SPEEDS, Unreachable, Vs060, out_of_limits};

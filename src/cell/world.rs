@@ -1,5 +1,5 @@
-//! In: motions and switches as the controller makes them, the cell's time. Out: where everything truly is at any moment that is
-//! not too long ago, what the controller believes, and what happened.
+//! In: motions and switches as the controller makes them, the cell's time. Out: where everything truly is at any
+//! moment that is not too long ago, what the controller believes, and what happened.
 //! Frame and unit: base frame, mm; joints rad; s of the cell.
 
 use super::component::Component;

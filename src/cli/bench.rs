@@ -8,37 +8,38 @@ use crate::gpu::Device;
 use crate::scan::Where;
 use std::path::{Path, PathBuf};
 
-/// Measure how fast the stripe chain is on this machine
+/// Measure the speed of the stripe chain on this machine
 ///
-/// Every row is one size and one scene: time a shot in steady state with several batches in flight, CPU time,
-/// shares of what memory and upload could carry, latency of a single shot, and the GPU's time per stage; "resident" is the
-/// rate with the pictures already where the stages read them, Mpx/s, "and full" that of the full chain. Below the table
-/// stands what a shot costs by itself and what every further megapixel and, where all scenes are measured, every further per
-/// cent of lit pixels adds.
+/// Every row is one size and one scene. It shows the time per shot in steady state with several batches in flight,
+/// and the CPU time. It also shows the share of what memory and upload could carry, the latency of a single shot, and
+/// the GPU's time per stage. "resident" is the rate in Mpx/s with the pictures already on the device, "and full" that
+/// of the full chain. Below the table stands the time of a shot and of every further megapixel. If all scenes are
+/// measured, the time of every further per cent of lit pixels follows.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight bench
   sheetlight bench --size 4096x3072 --scene one-stripe --seconds 10
   sheetlight bench --keep-up 30
-  sheetlight bench --json --save benches/runs/2026-11-21-desk")]
+  sheetlight bench --json --save benches/runs/2026-11-21-desk
+Guide: benches/README.md")]
 pub struct Args {
-    /// Picture size in pixels, may be repeated [default: 640x480, 1280x960, 4096x3072, 5120x5120]
+    /// Picture size, px; may be repeated [default: 640x480, 1280x960, 4096x3072, 5120x5120]
     #[arg(long, value_parser = size)]
     size: Vec<(u32, u32)>,
-    /// one-stripe, thick-stripe, upright-stripe, upright-thick, noise-heavy or reflection-heavy, may be repeated [default: all]
+    /// one-stripe, thick-stripe, upright-stripe, upright-thick, noise-heavy or reflection-heavy; may be repeated
+    /// [default: all]
     #[arg(long, value_parser = scene)]
     scene: Vec<Scene>,
-    /// Seconds a row runs
+    /// Duration of a row, s
     #[arg(long, default_value_t = BenchOptions::default().seconds)]
     seconds: f64,
-    /// Shots of a long run of the full chain, watched for growing memory (0: none)
+    /// Shots of a long run of the full chain that checks for growing memory; 0: none
     #[arg(long, default_value_t = 0)]
     soak: usize,
-    /// Let a software adapter read arrays from buffers, as all other adapters do
+    /// Let a software adapter read arrays from buffers, like other adapters
     #[arg(long)]
     from_buffers: bool,
-    /// In place of the table what the screen's page Health shows: what of a camera of so many pictures a second is measured and what
-    /// is dropped, at half and at full resolution; a shot on processor and GPU, beside recorded machines
+    /// Instead of the table: how many pictures of a camera of this rate are processed and how many are dropped
     #[arg(long, value_name = "HZ", conflicts_with_all = ["size", "scene", "soak", "from_buffers", "save"])]
     keep_up: Option<f64>,
     /// Folder for bench.json and bench.txt
@@ -114,7 +115,7 @@ fn health(rate_hz: f64, seconds: f64, console: &Console) -> Result<()> {
     let share = |n: u64, k: &KeptUp| 100.0 * n as f64 / k.sent.max(1) as f64;
     let kept = |k: &KeptUp| {
         format!(
-            "{:4}x{:<4} {} of {} pictures at {}/s measured, {:.1} % passed over, {:.1} % lost; p50 {:.2}, p99 {:.2} ms; {}",
+            "{:4}x{:<4} {} of {} pictures at {}/s measured, {:.1} % skipped, {:.1} % lost; p50 {:.2}, p99 {:.2} ms; {}",
             k.width,
             k.height,
             k.measured,

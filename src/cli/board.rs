@@ -19,41 +19,41 @@ use std::path::{Path, PathBuf};
   sheetlight board chessboard 9x6 --square-mm 10 --out boards/chess
   sheetlight board circles 7x5 --square-mm 20 --dot-mm 10 --asymmetric --out boards/dots
   sheetlight board markers 6x4 --square-mm 20 --gap-mm 6 --dictionary DICT_4X4_50 --out tags
-  sheetlight board markers 1x1 --square-mm 60 --dictionary DICT_4X4_50 --first-id 7 --out tag")]
+  sheetlight board markers 1x1 --square-mm 60 --dictionary DICT_4X4_50 --first-id 7 --out tag
+Guide: docs/boards.md")]
 pub struct Args {
     /// chessboard, charuco, circles or markers (ArUco, AprilTag)
     #[arg(value_parser = ["chessboard", "charuco", "circles", "markers"])]
     kind: String,
-    /// COLUMNSxROWS: inner corners of a chessboard, squares of a ChArUco board, dots of a circle grid, markers
-    /// (1x1: a single one)
+    /// COLUMNSxROWS: inner corners of a chessboard, squares of a ChArUco board, dots, or markers
     #[arg(value_parser = crate::cli::terminal::arguments::parse::<Size>)]
     size: Size,
-    /// Side of a square or of a single marker, or pitch of the dots, mm
-    #[arg(long)]
+    /// Side of a square or of a marker, or pitch of the dots, mm
+    #[arg(long, value_name = "MM")]
     square_mm: f64,
     /// ChArUco: side of a marker, mm [default: 0.7 of the square]
-    #[arg(long)]
+    #[arg(long, value_name = "MM")]
     marker_mm: Option<f64>,
-    /// Markers: white between two of them, mm [default: 0.3 of the marker]
-    #[arg(long)]
+    /// Markers: gap between two, mm [default: 0.3 of the marker]
+    #[arg(long, value_name = "MM")]
     gap_mm: Option<f64>,
     /// ChArUco, markers: id of the first one
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, value_name = "ID", default_value_t = 0)]
     first_id: u32,
-    /// ChArUco: begin with a white square, as OpenCV did before 4.6 on boards with an even number of rows
+    /// ChArUco: begin with a white square, as OpenCV before 4.6
     #[arg(long)]
     white_first: bool,
     /// ChArUco, markers: OpenCV's name of the dictionary
     #[arg(long, default_value = "DICT_5X5_250")]
     dictionary: String,
     /// Circles: diameter of a dot, mm [default: half of the pitch]
-    #[arg(long)]
+    #[arg(long, value_name = "MM")]
     dot_mm: Option<f64>,
-    /// Circles: shift every other row by one pitch, columns two pitches apart
+    /// Circles: shift every other row by one pitch; columns are two pitches apart
     #[arg(long)]
     asymmetric: bool,
     /// White margin round the print, mm [default: 0.6 of the square]
-    #[arg(long)]
+    #[arg(long, value_name = "MM")]
     border_mm: Option<f64>,
     /// Path of the files, without extension
     #[arg(long)]
@@ -67,7 +67,7 @@ impl std::str::FromStr for Size {
     type Err = String;
     fn from_str(s: &str) -> std::result::Result<Size, String> {
         let parsed = s.split_once('x').and_then(|(a, b)| Some(Size([a.parse().ok()?, b.parse().ok()?])));
-        parsed.ok_or_else(|| format!("'{s}' is no size: write COLUMNSxROWS, e.g. 9x6"))
+        parsed.ok_or_else(|| format!("'{s}' is not a size: write COLUMNSxROWS, e.g. 9x6"))
     }
 }
 
@@ -90,8 +90,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         && (a + b) % 2 == 0
     {
         console.warn(format!(
-                "{a}x{b} inner corners look the same after a half turn; choose one even and one odd number where poses matter"
-            ));
+            "{a}x{b} inner corners look the same after a half turn; choose one even and one odd number where \
+                 poses matter"
+        ));
     }
     console.say(format!(
         "{}.svg .pdf .json written: {:.1} x {:.1} mm; print without scaling and check the rule",

@@ -1,5 +1,5 @@
-//! In: a scene and a seed. Out: a simulated robot cell that answers on this machine's ports until Ctrl-C: controller, camera,
-//! gripper's camera; what happened, judged by its truth.
+//! In: a scene and a seed. Out: a simulated robot cell that answers on this machine's ports until Ctrl-C: controller,
+//! camera, gripper's camera; what happened, judged by its truth.
 //! Frame and unit: base frame, mm, degrees; s of the cell.
 
 use crate::cell::{Cell, CellOptions, Event, Served};
@@ -18,68 +18,68 @@ pub enum Command {
     Simulate(Box<Args>),
 }
 
-/// Simulate a whole robot cell at its wires: a controller that speaks b-CAP, a camera, lasers and gripper on its outputs
+/// Simulate a robot cell: b-CAP controller, camera, lasers, gripper
 ///
-/// Programs talk to it as to a real cell (docs/cell.md): a Denso VS-060 that moves in real time or --speed times as fast, a
-/// camera that sees what the arm's true pose sees. A component that the gripper lets go is judged by the truth. It runs until
-/// Ctrl-C; the URIs are on stdout.
+/// Programs talk to it as to a real cell (docs/cell.md): a Denso VS-060 that moves in real time or --speed times as
+/// fast, and a camera that sees what the arm's true pose sees. The truth judges a component that the gripper
+/// releases. It runs until Ctrl-C and prints the URIs on stdout.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight cell simulate --part led --seed 3 --speed 5 --station cell")]
+  sheetlight cell simulate --part led --seed 3 --speed 5 --station cell
+Guide: docs/cell.md")]
 pub struct Args {
-    /// Scene file (TOML, see docs/file-formats.md) [default: a circuit board with parts]
+    /// Scene file (TOML, docs/file-formats.md) [default: a circuit board with parts]
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// Design of the sensor (TOML; data/rigs holds some) [default: the paper's]
+    /// Design of the sensor (TOML; see data/rigs) [default: paper.toml]
     #[arg(long)]
     rig: Option<PathBuf>,
-    /// Name of the part of the scene whose component is in the gripper, and over which the arm begins
-    /// [default: the first with holes]
+    /// Part of the scene under the arm; its component is in the gripper [default: the first with holes]
     #[arg(long)]
     part: Option<String>,
-    /// A calibration board beside the scene (JSON as sheetlight board writes it)
+    /// Calibration board beside the scene (JSON from sheetlight board)
     #[arg(long)]
     board: Option<PathBuf>,
-    /// The arm begins over the board, as an operator jogs it there for `calibrate auto`; else over the part
+    /// Start the arm over the board instead of the part, for `calibrate auto`
     #[arg(long, requires = "board")]
     over_board: bool,
-    /// The sensor stands still and the flange carries the board before it, for `calibrate auto --mount eye-to-hand`
+    /// The sensor is fixed and the flange carries the board, for `calibrate auto --mount eye-to-hand`
     #[arg(long, requires = "board", conflicts_with = "over_board")]
     eye_to_hand: bool,
-    /// Another specimen of sensor, gripper and places, other noise, for every seed; 0 is the design itself
+    /// Random seed for sensor, gripper, poses and noise; 0 is the design itself
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Seconds of the cell in one of ours, 0.1 to 1000
+    /// Simulation speed factor, 0.1 to 1000
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
     /// Repeatability of the arm, 1 sigma an axis, mm
-    #[arg(long, default_value_t = 0.02)]
+    #[arg(long, value_name = "MM", default_value_t = 0.02)]
     noise_mm: f64,
     /// The same, degrees
-    #[arg(long, default_value_t = 0.004)]
+    #[arg(long, value_name = "DEG", default_value_t = 0.004)]
     noise_deg: f64,
     /// Largest error of the arm's lengths, mm
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, value_name = "MM", default_value_t = 0.0)]
     arm_error_mm: f64,
     /// Largest error of the joints' zeros, degrees
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, value_name = "DEG", default_value_t = 0.0)]
     arm_error_deg: f64,
     /// Largest tilt of the scene, degrees
-    #[arg(long, default_value_t = 2.0)]
+    #[arg(long, value_name = "DEG", default_value_t = 2.0)]
     tilt_deg: f64,
-    /// What the camera says of its pictures' times is late by so much, ms
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    /// Delay of the camera's stated picture times, ms
+    #[arg(long, value_name = "MS", default_value_t = 0.0, allow_negative_numbers = true)]
     camera_delay_ms: f64,
     /// Port of the controller, TCP and UDP; 0: any
-    #[arg(long, default_value_t = 5007)]
+    #[arg(long, value_name = "PORT", default_value_t = 5007)]
     robot_port: u16,
-    /// Port of the camera; 0: any. The gripper's camera has the next one
-    #[arg(long, default_value_t = 5017)]
+    /// Port of the camera; 0: any. The gripper's camera has the next port
+    #[arg(long, value_name = "PORT", default_value_t = 5017)]
     camera_port: u16,
-    /// Make a station folder for it: the sensor's true calibration, workspace, tool
+    /// Make a station folder: the sensor's true calibration, workspace, tool
     #[arg(long)]
     station: Option<PathBuf>,
-    /// Write what happened, a line of JSON each
+    /// Write every event as a line of JSON
     #[arg(long)]
     log: Option<PathBuf>,
 }

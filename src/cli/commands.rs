@@ -7,33 +7,55 @@ use super::find::{batch, filter, ghost, import_map, locate as find, matching, mo
 use super::insert::{guide, job, robot, sweep};
 use super::terminal::console::Console;
 use super::terminal::threads;
-use super::{bench, board, calibrate, cell, demo, live, range, scan, shift_scan, simulate, station, verify};
+use super::{bench, board, calibrate, cell, demo, live, range, rig, scan, shift_scan, simulate, station, verify};
 use crate::fault::Result;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-/// Sheet-of-light scanning with a robot: calibrate, scan, find, insert.
+/// Laser-line scanning with a robot: calibrate, scan, find, insert
 ///
-/// Data goes to stdout, talk to stderr. Exit code 0: done; 1: failed; 2: the command was misused.
+/// Data goes to stdout, messages to stderr. Exit code 0: done; 1: failed or refused; 2: wrong use.
 #[derive(Parser)]
-#[command(name = "sheetlight", version, max_term_width = 100)]
-#[command(after_help = "A first look, without camera, robot or GPU:
-  sheetlight demo
-A station, in this order:
-  sheetlight station new --station cell3 --robot denso
-  sheetlight calibrate camera recordings/intrinsics --station cell3
-  sheetlight calibrate hand-eye recordings/handeye --station cell3
-  sheetlight calibrate laser-plane recordings/laserplane --station cell3
-  sheetlight scan recordings/board7 --station cell3 --out scans/board7
-  sheetlight find scans/board7 --recipe data/recipes/led.toml --station cell3 --out pose.json")]
+#[command(name = "sheetlight", version, max_term_width = 100, disable_help_flag = true)]
+#[command(after_help = "A first look without hardware: sheetlight demo. Your own rig: docs/getting-started.md
+More about a command: sheetlight help COMMAND. Exit codes: 0 done, 1 failed, 2 wrong use")]
 struct Cli {
-    /// Print the result as JSON on stdout, for machines
-    #[arg(long, global = true)]
+    /// Print the result as JSON on stdout
+    #[arg(long, global = true, display_order = 900)]
     json: bool,
-    /// No progress bars, no talk
-    #[arg(long, global = true)]
+    /// No progress bars and no messages
+    #[arg(long, global = true, display_order = 901)]
     quiet: bool,
+    /// Print help that fits a screen
+    #[arg(short, long, global = true, display_order = 902, action = clap::ArgAction::HelpShort)]
+    help: Option<bool>,
     #[command(subcommand)]
     command: Command,
+}
+
+/// The commands as the help lists them.
+const GROUPS: [(&str, &[&str]); 6] = [
+    ("Station", &["rig", "station", "verify", "doctor"]),
+    ("Calibration", &["board", "calibrate"]),
+    ("Scan", &["camera", "record", "live", "scan", "shift-scan", "filter", "range", "batch"]),
+    ("Find", &["teach", "model", "find", "second-look", "ghost", "match", "import-map"]),
+    ("Robot", &["sweep", "job", "guide", "program", "robot"]),
+    ("Simulation and measurement", &["demo", "simulate", "cell", "bench"]),
+];
+
+/// The command line with its commands in groups, which clap itself does not do.
+fn grouped() -> clap::Command {
+    let command = Cli::command();
+    let mut list = String::new();
+    for (title, names) in GROUPS {
+        list += &format!("{title} commands:\n");
+        for name in names {
+            let about = command.find_subcommand(name).and_then(clap::Command::get_about);
+            list += &format!("  {name:12} {}\n", about.map(ToString::to_string).unwrap_or_default());
+        }
+    }
+    let template =
+        format!("{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{list}Options:\n{{options}}{{after-help}}");
+    command.help_template(template)
 }
 
 #[derive(Subcommand)]
@@ -41,10 +63,10 @@ enum Command {
     Batch(batch::Args),
     Bench(bench::Args),
     Board(board::Args),
-    /// Calibrate a station's camera, laser plane, pointer or hand-eye from a recording
+    /// Calibrate camera, hand-eye, laser plane, pointer or an axis from recordings
     #[command(subcommand)]
     Calibrate(calibrate::Command),
-    /// List, show and set cameras, take a picture, find the exposure
+    /// List cameras, show and set features, take a picture, set the exposure
     #[command(subcommand)]
     Camera(camera::Command),
     /// A simulated robot cell
@@ -64,7 +86,10 @@ enum Command {
     Program(program::Args),
     Range(range::Args),
     Record(record::Args),
-    /// Answer a robot that drives itself, try the outputs of one that is linked
+    /// Compute what a planned rig will resolve
+    #[command(subcommand)]
+    Rig(rig::Command),
+    /// Answer a robot's own program; test the outputs of a linked robot
     #[command(subcommand)]
     Robot(robot::Command),
     Scan(scan::Args),
@@ -72,7 +97,7 @@ enum Command {
     ShiftScan(shift_scan::Args),
     /// Simulate a station with known truth: recordings, poses, true calibration
     Simulate(simulate::Args),
-    /// Make, show, import into or export from a station folder
+    /// Make, show and change station folders; serve the operator's screen
     #[command(subcommand)]
     Station(station::Command),
     Sweep(sweep::Args),
@@ -102,6 +127,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Program(a) => program::run(a, console),
         Command::Range(a) => range::run(a, console),
         Command::Record(a) => record::run(a, console),
+        Command::Rig(c) => rig::run(c, console),
         Command::Robot(c) => robot::run(c, console),
         Command::Scan(a) => scan::run(a, console),
         Command::SecondLook(a) => second_look::run(a, console),
@@ -116,7 +142,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
 
 /// Parses the command line, runs it, prints an error if there is one. Returns the exit code.
 pub fn main() -> u8 {
-    let cli = match Cli::try_parse() {
+    let cli = match grouped().try_get_matches().and_then(|m| Cli::from_arg_matches(&m)) {
         Ok(cli) => cli,
         Err(e) => {
             // Nothing is left to be said when even stderr is closed.
@@ -138,23 +164,30 @@ pub fn main() -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     /// What a text shows to be typed: its lines, joined where a backslash ends them, from each `sheetlight` on.
-    fn shown(text: &str) -> Vec<String> {
+    fn shown(text: &str, mark: &str) -> Vec<String> {
         let joined = text.replace("\\\n", " ");
-        let calls =
-            joined.lines().filter(|l| l.starts_with("  ")).filter_map(|l| l.split_once("sheetlight ")).map(|(_, c)| c);
-        calls.map(|c| c.split(['>', '#']).next().unwrap_or_default().trim().to_owned()).collect()
+        let calls = joined.lines().filter_map(|l| l.strip_prefix(mark)).filter_map(|l| l.split_once("sheetlight "));
+        calls.map(|(_, c)| c.split(['>', '#']).next().unwrap_or_default().trim().to_owned()).collect()
     }
 
-    /// As a shell parts them, where no word has a blank in it.
-    fn words(call: &str) -> impl Iterator<Item = &str> {
-        call.split_whitespace().map(|w| w.trim_matches('\''))
+    /// As a shell splits them: quotes keep blanks.
+    fn words(call: &str) -> Vec<String> {
+        let mut all: Vec<String> = Vec::new();
+        for (i, part) in call.split('\'').enumerate() {
+            if i % 2 == 1 {
+                all.push(part.to_owned());
+            } else {
+                all.extend(part.split_whitespace().map(str::to_owned));
+            }
+        }
+        all
     }
 
     fn parses(call: &str) {
-        let parsed = Cli::try_parse_from(std::iter::once("sheetlight").chain(words(call)));
+        let typed = std::iter::once("sheetlight".to_owned()).chain(words(call));
+        let parsed = Cli::try_parse_from(typed);
         assert!(parsed.is_ok(), "sheetlight {call}\n{}", parsed.err().map(|e| e.to_string()).unwrap_or_default());
     }
 
@@ -162,26 +195,58 @@ mod tests {
         let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
         let wide = help.lines().find(|l| l.len() > 98);
         assert!(wide.is_none(), "{}: wraps in the help: {wide:?}", command.get_name());
-        let calls = shown(&help);
+        let calls = shown(&help, "  ");
         calls.iter().for_each(|c| parses(c));
         calls.len() + command.get_subcommands().map(check).sum::<usize>()
     }
 
     #[test]
-    fn every_command_that_help_and_readme_show_can_be_typed() {
+    fn every_command_that_help_and_documents_show_can_be_typed() {
         let command = Cli::command();
         assert!(check(&command) > 20);
-        let readme = shown(include_str!("../../README.md"));
-        assert!(readme.len() > 8, "{readme:?}");
-        readme.iter().for_each(|c| parses(c));
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+        let guides = std::fs::read_dir(root.join("docs")).unwrap().map(|entry| entry.unwrap().path());
+        let pages = guides.chain([root.join("README.md"), root.join("docs/robots/README.md")]);
+        let mut count = 0;
+        for page in pages.filter(|p| p.extension().is_some_and(|e| e == "md")) {
+            let text = std::fs::read_to_string(&page).unwrap();
+            let text = text.lines().map(str::trim_start).collect::<Vec<_>>().join("\n");
+            for call in shown(&text, "$ ") {
+                println!("{}: {call}", page.display());
+                parses(&call);
+                count += 1;
+            }
+            // Within a sentence commands may be shortened, but they name no command or option that is not there.
+            for call in text.split('`').skip(1).step_by(2).filter_map(|code| code.strip_prefix("sheetlight ")) {
+                let typed = std::iter::once("sheetlight".to_owned()).chain(words(call));
+                let kind = Cli::try_parse_from(typed).err().map(|e| e.kind());
+                let unknown = [clap::error::ErrorKind::UnknownArgument, clap::error::ErrorKind::InvalidSubcommand];
+                assert!(!kind.is_some_and(|k| unknown.contains(&k)), "{}: sheetlight {call}", page.display());
+            }
+        }
+        assert!(count > 60, "{count} commands in documents");
         // Every option and argument says what it is.
-        fn told(command: &clap::Command) {
+        fn described(command: &clap::Command) {
             for a in command.get_arguments() {
                 assert!(a.get_help().is_some(), "{} {} has no help", command.get_name(), a.get_id());
             }
-            command.get_subcommands().for_each(told);
+            command.get_subcommands().for_each(described);
         }
-        told(&command);
+        described(&command);
+    }
+
+    #[test]
+    fn the_help_lists_every_command_once() {
+        let mut listed: Vec<&str> = GROUPS.iter().flat_map(|(_, names)| names.iter().copied()).collect();
+        let mut known: Vec<String> = Cli::command().get_subcommands().map(|c| c.get_name().to_owned()).collect();
+        listed.sort_unstable();
+        known.sort();
+        assert_eq!(listed, known);
+        let help = grouped().render_help().to_string();
+        for line in help.lines() {
+            assert!(line.chars().count() <= 100, "wraps: {line}");
+        }
+        assert!(help.contains("\n  second-look  Plan a verification scan"), "{help}");
     }
 
     #[test]

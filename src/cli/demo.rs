@@ -13,16 +13,16 @@ use crate::station::{FoundPart, Judged, ScanOptions, ScanReport, Settings};
 use crate::station::{judge, judge_parts};
 use std::path::PathBuf;
 
-/// Simulate a station with a board full of parts, scan it, and show how good the scan is
+/// Simulate a board full of parts, scan it, and show the scan's accuracy
 ///
-/// Needs no camera, robot or GPU. Leaves in --out: simulated/ (the pictures, poses and calibration that
-/// a real station would have given) and the scan: cloud, height map, overlays, errors, index.html.
+/// Needs no camera, robot or GPU. Writes into --out: simulated/ (the pictures, poses and calibration of a real
+/// station) and the scan: cloud, height map, overlays, errors, index.html.
 #[derive(clap::Args)]
 pub struct Args {
     /// Folder for everything
     #[arg(long, default_value = "demo")]
     out: PathBuf,
-    /// Another specimen of the station, another noise
+    /// Random seed for the station and its noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Shots of the pass over the board
@@ -31,7 +31,7 @@ pub struct Args {
     /// Sensor width, px; the height is three quarters of it
     #[arg(long, default_value_t = 640)]
     width: u32,
-    /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
+    /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
     #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
 }

@@ -5,17 +5,17 @@ use crate::find::insert::recipe::InsertionSpec;
 
 #[derive(clap::Args)]
 pub struct InsertionArgs {
-    /// What the insertion bears in the plane, mm
-    #[arg(long, default_value_t = 0.25)]
+    /// Tolerance of the insertion in the plane, mm
+    #[arg(long, value_name = "MM", default_value_t = 0.25)]
     tolerance_mm: f64,
-    /// What the insertion bears as a turn, degrees
-    #[arg(long, default_value_t = 0.5)]
+    /// Tolerance of the insertion in rotation, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.5)]
     tolerance_deg: f64,
     /// Height of the approach above the part, mm
-    #[arg(long, default_value_t = 30.0)]
+    #[arg(long, value_name = "MM", default_value_t = 30.0)]
     approach_mm: f64,
-    /// Height of the retreat above the part, mm
-    #[arg(long, default_value_t = 60.0)]
+    /// Height of the retract pose above the part, mm
+    #[arg(long, value_name = "MM", default_value_t = 60.0)]
     retract_mm: f64,
 }
 

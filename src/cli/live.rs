@@ -1,5 +1,5 @@
-//! In: a running camera, a station. Out: one line a measured picture: its points, how long it took, how many were passed over meanwhile; the
-//! account. Frame and unit: camera frame, mm; milliseconds.
+//! In: a running camera, a station. Out: one line a measured picture: its points, how long it took, how many were
+//! passed over meanwhile; the account. Frame and unit: camera frame, mm; milliseconds.
 
 use super::capture::options::Running;
 use super::terminal::console::Console;
@@ -13,30 +13,32 @@ use crate::station::Settings;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Measure the stripe in the newest picture of a running camera, with the least delay
+/// Measure the stripe in the newest picture of a running camera
 ///
-/// Pictures that arrive while one is measured are passed over, but for the newest, and counted. Prints one JSON object a
-/// line and picture on stdout; rate, delay and drops on a line of the terminal; a summary at the end. For recordings use scan, which
-/// measures every shot.
+/// Pictures that arrive during a measurement are skipped, except the newest, and counted. Prints one JSON object per
+/// picture on stdout, one line each; rate, delay and drops on a line of the terminal; a summary at the end. For
+/// recordings use scan, which measures every shot.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight live --camera gige://first --station cell3
   sheetlight live --camera ffmpeg:/dev/video0 --station cell3 --points > profiles.jsonl
   camera-tool --raw | \\
-      sheetlight live --raw 4096x3072:gray12le --station cell3 --points > profiles.jsonl")]
+      sheetlight live --raw 4096x3072:gray12le --station cell3 --points > profiles.jsonl
+All options: sheetlight help live
+Guide: docs/live.md")]
 pub struct Args {
     #[command(flatten)]
     running: Running,
-    /// Frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
+    /// Raw frames on standard input: WIDTHxHEIGHT:gray8, gray10le, ...
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<RawFormat>)]
     raw: Option<RawFormat>,
-    /// Station folder with the calibration of camera and laser plane
+    /// Station folder with camera and laser plane calibrated
     #[arg(long)]
     station: PathBuf,
-    /// Print the points too: [x, y, z, sigma] in the camera frame, mm
+    /// Also print the points: [x, y, z, sigma] in the camera frame, mm
     #[arg(long)]
     points: bool,
-    /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
+    /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
     #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
 }
@@ -111,7 +113,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     teller.last_word(&feed);
     let a = feed.account();
     console.say(format!(
-        "{} frames: {measured_count} measured, {} passed over, {without_stripe} without a stripe; latency {}; {}",
+        "{} frames: {measured_count} measured, {} skipped, {without_stripe} without a stripe; latency {}; {}",
         a.complete,
         a.dropped_processing,
         delays(&waits),

@@ -14,6 +14,7 @@ mod insert;
 mod insertion;
 mod live;
 mod range;
+mod rig;
 mod scan;
 mod shift_scan;
 mod simulate;

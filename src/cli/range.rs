@@ -11,23 +11,24 @@ use std::path::PathBuf;
 
 /// Measure distances with the laser pointer
 ///
-/// Prints for each picture the distance along the beam and along the optical axis with its standard
-/// deviation; with robot poses and a hand-eye calibration also the point in the base frame. With
-/// --surface the shots are taken to be of one plane: its normal and the tool pose square to it follow,
-/// and where station.toml has a [tool], how it leant at the last shot and how the flange stands when it is square there.
+/// Prints for each picture the distance along the beam and along the optical axis with its standard deviation. With
+/// robot poses and a hand-eye calibration it also prints the point in the base frame. With --surface the shots are
+/// taken as one plane: its normal and the tool pose square to it follow. If station.toml has a [tool], the tool's
+/// lean at the last shot and the flange pose that makes it square follow too.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight range recordings/pointer --station cell3 --json > distances.json")]
+  sheetlight range recordings/pointer --station cell3 --json > distances.json
+Guide: docs/finding-and-inserting.md")]
 pub struct Args {
     /// Recording folder with a laser picture per frame
     recording: PathBuf,
     /// Station folder with camera and pointer calibrations
     #[arg(long)]
     station: PathBuf,
-    /// Pose file of the recording, without extension [default: the one meta.json names]
+    /// Pose file of the recording, without extension [default: the one in meta.json]
     #[arg(long)]
     poses: Option<String>,
-    /// The shots are of one plane surface: work out its normal (needs poses and hand-eye)
+    /// All shots show one plane: compute its normal (needs poses and hand-eye)
     #[arg(long)]
     surface: bool,
 }
@@ -72,13 +73,14 @@ fn table(r: &RangeReport, robot: Convention) -> String {
             f.tilt_sigma_deg[0], f.tilt_sigma_deg[1], f.rms_mm
         );
         if let Some(name) = &f.left_out {
-            s += &format!("{name} was left out of it: its spot does not lie on the plane of the others\n");
+            s += &format!("{name} was excluded: its spot does not lie on the plane of the others\n");
         }
         s += &format!("tool square to it ({}): {}\n", robot.name(), written(robot, robot.write(&f.base_from_tool)));
     }
     if let Some(q) = &r.square {
         s += &format!(
-            "the tool leant {:.4} ± {:.4} degrees at the last shot; square there, by turning about its origin: flange {}\n",
+            "the tool leant {:.4} ± {:.4} degrees at the last shot; square there, by turning about its origin: \
+             flange {}\n",
             q.tilt_deg,
             q.tilt_sigma_deg,
             written(robot, robot.write(&q.base_from_flange))

@@ -15,14 +15,14 @@ use crate::station::{Judged, ScanOptions, ScanReport, Settings, scan_recording};
 use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
 
-/// Turn the shots of a recording into a point cloud and a height map
+/// Turn a recording into a point cloud and a height map
 ///
-/// meta.json says what moved: a robot with the sensor (nothing else is said), a robot with the part, a linear axis or a
-/// turntable; an axis needs no hand-eye, but its own calibration (sheetlight calibrate axis).
+/// meta.json states what moved: a robot with the sensor (the default), a robot with the part, a linear axis or a
+/// turntable. An axis needs its own calibration (sheetlight calibrate axis) instead of a hand-eye.
 ///
-/// Writes into --out: cloud.ply and cloud.pcd (base frame, or that of axis or flange, mm, with a standard deviation for each
-/// point; frame: docs/conventions.md), height.tif (float, mm, NaN where nothing was seen), height.png with its scale beside it,
-/// pictures to look at, overlays of a few shots, scan.json with every figure, and index.html.
+/// Writes into --out: cloud.ply and cloud.pcd (mm, with a standard deviation for each point), height.tif (float, mm,
+/// NaN for missing cells), height.png with its scale, pictures, overlays of a few shots, scan.json and index.html.
+/// The frame of the cloud is explained in docs/conventions.md.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight scan recordings/board7 --station cell3 --out scans/board7
@@ -31,9 +31,11 @@ use std::path::{Path, PathBuf};
   ffmpeg -i shots.mkv -f rawvideo -pix_fmt gray - | sheetlight scan --raw 4096x3072:gray8 \\
       --poses poses.csv --station cell3 --out scans/live
   sheetlight scan --camera gige://first --pair clock --pose-stream bcap://10.0.0.2 \\
-      --record recordings/board9 --station cell3 --out scans/board9")]
+      --record recordings/board9 --station cell3 --out scans/board9
+All options: sheetlight help scan
+Guide: docs/scanning.md")]
 pub struct Args {
-    /// Recording folder with meta.json; leave out with --raw or --camera
+    /// Recording folder with meta.json; not with --raw or --camera
     #[arg(conflicts_with = "camera")]
     recording: Option<PathBuf>,
     /// Station folder with the calibration
@@ -42,8 +44,7 @@ pub struct Args {
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
-    /// Pose file: a name in the recording, without extension [default: the one meta.json names]; with
-    /// --raw, which needs it, a path
+    /// Pose file of the recording, without extension [default: the one in meta.json]; with --raw a path
     #[arg(long)]
     poses: Option<String>,
     /// Raw frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
@@ -51,38 +52,38 @@ pub struct Args {
     raw: Option<RawFormat>,
     #[command(flatten)]
     capture: Capture,
-    /// With --camera: keep its pictures as a recording in this folder; what cannot be scanned in time waits there
+    /// Also store the camera's pictures as a recording in this folder
     #[arg(long, value_name = "FOLDER", requires = "camera")]
     record: Option<PathBuf>,
-    /// Part of a colour picture to use: red, green, blue or luma
+    /// Channel of a colour picture: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
-    /// Picture with the laser off, taken at the shots' exposure, to be subtracted from every shot: a name in the recording,
-    /// or a path. Never taken by itself: the `ambient` picture that meta.json names may be exposed for room light
+    /// Picture with the laser off at the shots' exposure, subtracted from every shot: a name in the recording, or a
+    /// path
     #[arg(long)]
     ambient: Option<PathBuf>,
-    /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
+    /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
     #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
-    /// Edge of a height map cell, mm [default: about 1.5 points a cell]
-    #[arg(long)]
+    /// Cell of the height map, mm [default: about 1.5 points per cell]
+    #[arg(long, value_name = "MM")]
     cell_mm: Option<f64>,
-    /// Shots to draw with their peaks
-    #[arg(long, default_value_t = 6)]
+    /// Number of shots to draw with their peaks
+    #[arg(long, hide_short_help = true, default_value_t = 6)]
     overlays: usize,
-    /// With --raw: numbers of the frames that never came, from 0; frames and poses must then be as many
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',', requires = "raw")]
+    /// Numbers of missing frames of --raw, from 0
+    #[arg(long, hide_short_help = true, value_name = "N,N,...", value_delimiter = ',', requires = "raw")]
     missing: Vec<usize>,
-    /// Read pictures and poses that meta.json names outside the recording's folder
-    #[arg(long)]
+    /// Allow pictures and poses outside the recording's folder
+    #[arg(long, hide_short_help = true)]
     pictures_outside: bool,
-    /// Leave out shots that cannot be read, and list them
+    /// Exclude shots that cannot be read, and list them
     #[arg(long)]
     skip_bad: bool,
     /// Continue an interrupted scan into the same folder
     #[arg(long)]
     resume: bool,
-    /// Compare the points with the truth.json of a simulated recording: adds errors.json and a picture of them
+    /// Compare the points with this truth.json of a simulated recording
     #[arg(long)]
     truth: Option<PathBuf>,
 }
@@ -170,7 +171,7 @@ fn from_recording(
     } else if args.poses.is_some() {
         return Err(Fault::usage("--poses is given, and meta.json says that an axis moved")
             .cause("another recording, or a motion that is not this one's")
-            .next("leave --poses out, or correct 'motion' in meta.json"));
+            .next("omit --poses, or correct 'motion' in meta.json"));
     }
     if let Some(name) = &args.ambient {
         let inside = folder.join(name);
@@ -287,7 +288,7 @@ fn summary(r: &ScanReport, out: &Path) -> String {
         s += &format!("  note: {remark}\n");
     }
     for (name, why) in &r.skipped {
-        s += &format!("  left out {name}: {why}\n");
+        s += &format!("  excluded {name}: {why}\n");
     }
     if let Some(account) = &r.camera {
         s += &format!("the camera: {account}\n");

@@ -11,46 +11,47 @@ use crate::scan::grid;
 use crate::scan::{GridOptions, MAP_FILES, ShiftReport, ShiftRig, Side, shift_scan, write_cloud};
 use std::path::{Path, PathBuf};
 
-/// Heights from the stripe's sideways shift, for a rig that has no calibrated camera
+/// Heights from the stripe's sideways shift, without a calibrated camera
 ///
-/// The stripe runs along image columns; the bed moves between pictures. With s = shift / pixels-per-mm
-/// the height is D s / (d + s): D the camera's height above the bed, d the laser's distance from the camera.
-/// Rows that always show the bare bed give the zero of each picture.
+/// The stripe runs along image columns; the bed moves between pictures. With s = shift / pixels-per-mm the height is
+/// D s / (d + s). D is the camera's height above the bed, d the laser's distance from the camera. Rows that always
+/// show the bare bed give the zero of each picture.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight shift-scan photos/cube --pixels-per-mm 10.6277 --camera-height-mm 80 \\
       --baseline-mm 37.3 --raises left --travel-mm 1 \\
       --bed-rows 5..40,440..475 --channel red --reference photos/empty \
-      --out scans/cube")]
+      --out scans/cube
+Guide: docs/math.md, Shift")]
 pub struct Args {
-    /// Folder with the pictures, taken in the order of their names (frame2 before frame10)
+    /// Folder with the pictures, in the order of their names (frame2 before frame10)
     pictures: PathBuf,
     /// Pixels per mm on the bed
-    #[arg(long)]
+    #[arg(long, value_name = "MM")]
     pixels_per_mm: f64,
     /// Camera above the bed, mm
-    #[arg(long)]
+    #[arg(long, value_name = "MM")]
     camera_height_mm: f64,
     /// Distance of the laser from the camera, mm
-    #[arg(long)]
+    #[arg(long, value_name = "MM")]
     baseline_mm: f64,
-    /// To which side a raised surface moves the stripe: left or right
+    /// Side to which a raised surface moves the stripe: left or right
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Side>)]
     raises: Side,
     /// Travel of the bed from picture to picture, mm
-    #[arg(long)]
+    #[arg(long, value_name = "MM")]
     travel_mm: f64,
-    /// Picture rows that always show the bare bed: first..last, several times or separated by commas
+    /// Rows that always show the bare bed: first..last; repeat or separate by commas
     #[arg(long, value_delimiter = ',', required = true)]
     bed_rows: Vec<String>,
-    /// Part of a colour picture to use: red, green, blue or luma
+    /// Channel of a colour picture: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
-    /// Folder with pictures of the empty bed, taken in the same way: how lens and laser bend the stripe is taken out
+    /// Folder with pictures of the empty bed, to correct the bend of the stripe
     #[arg(long)]
     reference: Option<PathBuf>,
-    /// Points lower than this do not count for the level surface, mm
-    #[arg(long, default_value_t = 1.0)]
+    /// Points below this height do not count for the level surface, mm
+    #[arg(long, value_name = "MM", default_value_t = 1.0)]
     min_height_mm: f64,
     /// Folder for cloud, height map and report
     #[arg(long)]
@@ -121,7 +122,8 @@ fn summary(r: &ShiftReport) -> String {
     s + &match r.plateau {
         None => "no level surface stands on the bed\n".into(),
         Some(p) => format!(
-            "level surface {:.3} mm above the bed ({} points in {} pictures, noise {:.3} mm, between pictures {:.3} mm)\n",
+            "level surface {:.3} mm above the bed ({} points in {} pictures, noise {:.3} mm, between pictures {:.3} \
+             mm)\n",
             p.height_mm, p.points, p.shots, p.noise_mm, p.between_shots_mm
         ),
     }

@@ -22,48 +22,45 @@ use std::path::PathBuf;
 ///          sheetlight simulate --out again --seed 3 --poses second.json
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folder for the recordings (one a set) and the station
+    /// Folder for the recordings (one per set) and the station
     #[arg(long)]
     out: PathBuf,
-    /// What to record, several times or separated by commas: scan, intrinsics, handeye, laserplane,
-    /// pointer_cal, pointer, surface, axis, all
+    /// What to record, separated by commas: scan, intrinsics, handeye, laserplane, pointer_cal, pointer, surface,
+    /// axis, all
     #[arg(long = "set", value_delimiter = ',', default_value = "scan")]
     sets: Vec<String>,
-    /// Design of the station (TOML, see docs/file-formats.md; data/rigs holds some) [default: the paper's]
+    /// Design of the station (TOML; see data/rigs) [default: paper.toml]
     #[arg(long)]
     rig: Option<PathBuf>,
-    /// Scene file (TOML, see docs/file-formats.md) [default: a circuit board with parts; with --rig a stepped
-    /// block and a notched plate that fit into its field]
+    /// Scene file (TOML, docs/file-formats.md) [default: a circuit board; with --rig a stepped block and a notched
+    /// plate]
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// Description of the calibration board (JSON as sheetlight board writes it) for the sets
-    /// that show one [default: the station's own]
+    /// Calibration board (JSON from sheetlight board) [default: built in]
     #[arg(long)]
     board: Option<PathBuf>,
-    /// Another specimen of the station, scene pose and noise for every seed; 0 is the design itself
+    /// Random seed for station, scene pose and noise; 0 is the design itself
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Sensor width, px; the lens and what it sees stay [default: the rig's, 640]
+    /// Sensor width, px; lens and field of view stay [default: the rig's, 640]
     #[arg(long)]
     width: Option<u32>,
     /// Sensor height, px [default: in proportion to the width]
     #[arg(long)]
     height: Option<u32>,
-    /// What moves: robot (the sensor, over the scene), linear or turntable (the parts, past a sensor that stands still; the
-    /// station gets the true axis, and the set axis shows a board that rides on it)
+    /// What moves: robot (the sensor), linear or turntable (the parts)
     #[arg(long, default_value = "robot", value_parser = crate::cli::terminal::arguments::parse::<Moved>)]
     motion: Moved,
     /// Bits per pixel, 8 to 16 [default: the rig's, 8]
     #[arg(long)]
     bits: Option<u8>,
-    /// Shots of a scan [default: 200; with --rig one every one and a half pixel footprints; of a turntable, which goes all the
-    /// way around, ten times as many]
+    /// Shots of a scan [default: 200; with --rig one per 1.5 pixel footprints; turntable 2000]
     #[arg(long)]
     shots: Option<usize>,
-    /// Flange poses to take the set scan or surface from instead of our own, one a shot, as second-look writes them
+    /// Flange poses for the set scan or surface, one per shot, as second-look writes them
     #[arg(long, value_name = "FILE", conflicts_with = "shots")]
     poses: Option<PathBuf>,
-    /// Scales shot noise, read noise, speckle and hot pixels; 0 is a noiseless sensor
+    /// Factor on shot noise, read noise, speckle and hot pixels; 0: no noise
     #[arg(long, default_value_t = 1.0)]
     noise: f64,
     /// Speckle contrast per pixel, 0 to 0.6 [default: the rig's, 0.12]
@@ -73,10 +70,10 @@ pub struct Args {
     #[arg(long)]
     exposure: Option<f64>,
     /// Error of the reported robot poses, 1 sigma per axis, mm
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, value_name = "MM", default_value_t = 0.0)]
     pose_noise_mm: f64,
-    /// The same for the rotation, degrees
-    #[arg(long, default_value_t = 0.0)]
+    /// Error of the reported rotations, 1 sigma per axis, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0)]
     pose_noise_deg: f64,
 }
 

@@ -7,31 +7,32 @@ use crate::rig::Rig;
 use crate::station::{VerifyReport, VerifyRun, verify};
 use std::path::PathBuf;
 
-/// Check a station with data that its calibrations did not see
+/// Check a station with data that its calibrations did not use
 ///
-/// A small residual does not prove a small error. This shows, apart from each fit, how well data that
-/// was left out is predicted; how well a flat plate scanned from several poses agrees with itself; how well
-/// scans of any object from several sides agree, and which calibration would explain it where they do not; and
-/// how far touched points are from where the system put them.
+/// A small residual does not prove a small error. The report shows, apart from each fit, how well excluded data is
+/// predicted. With --flat it shows how well a flat plate scanned from several poses agrees with itself. With --object
+/// it shows how well scans of any object from several sides agree, and which calibration would explain a
+/// disagreement. With --touch it shows how far touched points are from where the system put them.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight verify --station cell3
   sheetlight verify --station cell3 --flat scans/plate --shots-per-view 16 --touch touches.csv
-  sheetlight verify --station cell3 --object scans/casting --object scans/casting-turned")]
+  sheetlight verify --station cell3 --object scans/casting --object scans/casting-turned
+Guide: docs/calibration.md")]
 pub struct Args {
     /// Station folder
     #[arg(long)]
     station: PathBuf,
-    /// Scan folder of a flat surface; give it several times for several scans
+    /// Scan folder of a flat surface; may be repeated
     #[arg(long)]
     flat: Vec<PathBuf>,
-    /// A flat scan holds several poses of this many shots each; 0: each scan is one view
-    #[arg(long, default_value_t = 0)]
+    /// Shots per pose, if a flat scan holds several poses; 0: each scan is one view
+    #[arg(long, value_name = "N", default_value_t = 0)]
     shots_per_view: u32,
-    /// Scan folder of an object of any shape; give it for two or three scans of it from several sides
+    /// Scan folder of an object; give two or three scans from several sides
     #[arg(long)]
     object: Vec<PathBuf>,
-    /// Touch test: a file with predicted x y z and touched x y z (base frame, mm) a line
+    /// Touch test: a file with predicted x y z and touched x y z (base frame, mm) per line
     #[arg(long)]
     touch: Option<PathBuf>,
 }
@@ -57,13 +58,14 @@ fn text(r: &VerifyReport) -> String {
     for (name, c) in &r.calibrations {
         s += &format!("  {name:12} {}\n", figures(&c.fit));
     }
-    s += "Verification (data that was left out, and what is to be expected)\n";
+    s += "Verification (excluded data, and the expected errors)\n";
     for (name, c) in &r.calibrations {
         s += &format!("  {name:12} {} ({})\n", figures(&c.verification), c.verdict);
     }
     if let Some(f) = &r.flat {
         s += &format!(
-            "Flat surface, {} views: heights spread by {:.4} mm (range {:.4}), tilts up to {:.4} degrees, points {:.4} mm rms about their own planes and {:.4} about the common one\n",
+            "Flat surface, {} views: heights spread by {:.4} mm (range {:.4}), tilts up to {:.4} degrees, points \
+             {:.4} mm rms about their own planes and {:.4} about the common one\n",
             f.views.len(),
             f.height_spread_mm,
             f.height_range_mm,
@@ -94,7 +96,8 @@ fn text(r: &VerifyReport) -> String {
     if let Some(t) = &r.touch {
         let [x, y, z] = t.mean_mm;
         s += &format!(
-            "Touch test, {} points: {:.3} mm rms, worst {:.3} mm (number {}), mean {x:+.3} {y:+.3} {z:+.3} mm, {:.3} mm about the mean\n",
+            "Touch test, {} points: {:.3} mm rms, worst {:.3} mm (number {}), mean {x:+.3} {y:+.3} {z:+.3} mm, {:.3} \
+             mm about the mean\n",
             t.points, t.rms_mm, t.worst_mm, t.worst, t.scatter_mm
         );
     }

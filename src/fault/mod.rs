@@ -110,7 +110,7 @@ impl Fault {
         Fault::input(format!("{}: cannot be read: {e}", path.display()))
             .cause(match e.kind() {
                 std::io::ErrorKind::NotFound => "the path is wrong, or the file was moved",
-                std::io::ErrorKind::InvalidData => "it is no text: a picture, a cloud, or a file in another encoding",
+                std::io::ErrorKind::InvalidData => "it is not text: a picture, a cloud, or a file in another encoding",
                 _ => "no permission, or a disk fault",
             })
             .next(if e.kind() == std::io::ErrorKind::InvalidData {

@@ -1,5 +1,5 @@
-//! In: bytes that come one after another for hours. Out: a file that holds all of them up to the moment in which the program or the
-//! machine was stopped.
+//! In: bytes that come one after another for hours. Out: a file that holds all of them up to the moment in which the
+//! program or the machine was stopped.
 //! Frame and unit: bytes.
 
 use super::moment;

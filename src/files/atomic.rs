@@ -11,21 +11,21 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use tempfile::NamedTempFile;
 
-/// Writes to a temporary file in the same folder, syncs it, and renames it over `path`. A link of that name is replaced,
-/// not followed.
+/// Writes to a temporary file in the same folder, syncs it, and renames it over `path`. A link of that name is
+/// replaced, not followed.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_aside(path, bytes)?.keep()
 }
 
-/// [`write()`] without waiting for the disk: for pictures by the hundred that can be made again. Half of one never has its
-/// name, but a power cut may take whole ones.
+/// [`write()`] without waiting for the disk: for pictures by the hundred that can be made again. Half of one never
+/// has its name, but a power cut may take whole ones.
 pub fn write_unsynced(path: &Path, bytes: &[u8]) -> Result<()> {
     let aside = write_aside(path, bytes)?;
     rename(aside.file, path).map_err(|e| Fault::write(path, e))
 }
 
-/// [`write()`] of a result and of what is shown beside it (its picture, its page). Whenever the program is stopped or the disk
-/// is full, the result is the old one or the new one, whole, and beside it stands its own or nothing.
+/// [`write()`] of a result and of what is shown beside it (its picture, its page). Whenever the program is stopped or
+/// the disk is full, the result is the old one or the new one, whole, and beside it stands its own or nothing.
 pub fn write_beside(result: (&Path, &[u8]), beside: &[(&Path, &[u8])]) -> Result<()> {
     let aside = |(path, bytes): (&Path, &[u8])| {
         let aside = write_aside(path, bytes)?;
@@ -37,8 +37,8 @@ pub fn write_beside(result: (&Path, &[u8]), beside: &[(&Path, &[u8])]) -> Result
     std::iter::once(first).chain(others).try_for_each(Aside::keep)
 }
 
-/// [`Aside::keep`] of many. A thread each, or as many as can be had, because files that are waited for together reach the
-/// disk together.
+/// [`Aside::keep`] of many. A thread each, or as many as can be had, because files that are waited for together reach
+/// the disk together.
 pub fn keep_all(files: Vec<Aside>) -> Result<()> {
     let threads = files.len();
     let left = Mutex::new(files);

@@ -1,4 +1,5 @@
-//! In: paths of folders and of what lies in them. Out: folders that are there, names that are on the disk, things taken away.
+//! In: paths of folders and of what lies in them. Out: folders that are there, names that are on the disk, things
+//! taken away.
 //! Frame and unit: none.
 
 use super::moment;

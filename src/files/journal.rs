@@ -1,5 +1,5 @@
-//! In: lines, one after the other. Out: a file that grows by whole lines that are on the disk before the call returns; a line
-//! that a crash cut off is ended before the next is written.
+//! In: lines, one after the other. Out: a file that grows by whole lines that are on the disk before the call
+//! returns; a line that a crash cut off is ended before the next is written.
 //! Frame and unit: none; text.
 
 use crate::fault::{Fault, Result};

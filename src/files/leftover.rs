@@ -1,5 +1,5 @@
-//! In: folders that results are written into. Out: files under temporary names, held by a lock as long as who writes them lives, and
-//! those gone that a killed process has left.
+//! In: folders that results are written into. Out: files under temporary names, held by a lock as long as who writes
+//! them lives, and those gone that a killed process has left.
 //! Frame and unit: none.
 
 use super::remove;
@@ -55,7 +55,8 @@ pub fn sweep(folder: &Path) -> Io<()> {
     Ok(())
 }
 
-/// Whether this process writes into a folder for the first time: a list of thousands of pictures is read once, not for each.
+/// Whether this process writes into a folder for the first time: a list of thousands of pictures is read once, not
+/// for each.
 fn first_in(folder: &Path) -> bool {
     static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
     let name = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());

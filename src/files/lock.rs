@@ -12,7 +12,8 @@ pub struct Lock {
     _file: File,
 }
 
-/// How long a lock is asked for. A process that this one is just starting holds copies of its open files until it has begun.
+/// How long a lock is asked for. A process that this one is just starting holds copies of its open files until it has
+/// begun.
 const PATIENCE: Duration = Duration::from_millis(400);
 
 impl Lock {
@@ -51,7 +52,7 @@ fn open(folder: &Path, name: &str) -> Result<(PathBuf, File)> {
     let path = folder.join(format!("{name}.lock"));
     if std::fs::symlink_metadata(&path).is_ok_and(|m| !m.is_file()) {
         return Err(Fault::output(format!("{}: is a link or a folder where a lock is to be", path.display()))
-            .cause("somebody else made it; what it points at is left alone")
+            .cause("it was not made by this program; its target is not touched")
             .next("take it away, or choose another folder"));
     }
     let file = File::options().create(true).truncate(false).write(true).open(&path);

@@ -4,8 +4,8 @@
 
 use std::io::Result;
 
-/// Stands before every file operation that a result depends on. Under `SHEETLIGHT_DIE_AT=n` the n-th ends the process as a
-/// kill would, without unwinding; under `SHEETLIGHT_FULL_AT=n` it and all after it fail as on a full disk.
+/// Stands before every file operation that a result depends on. Under `SHEETLIGHT_DIE_AT=n` the n-th ends the process
+/// as a kill would, without unwinding; under `SHEETLIGHT_FULL_AT=n` it and all after it fail as on a full disk.
 #[cfg(debug_assertions)]
 pub fn moment() -> Result<()> {
     use std::sync::OnceLock;

@@ -1,5 +1,5 @@
-//! In: the path of a file that somebody else wrote. Out: its bytes or its text, never more of them than it may have, and
-//! never by waiting for a sender.
+//! In: the path of a file that somebody else wrote. Out: its bytes or its text, never more of them than it may have,
+//! and never by waiting for a sender.
 //! Frame and unit: bytes.
 
 use crate::fault::{Fault, Result};

@@ -3,7 +3,8 @@
 
 use crate::fault::{Fault, Result};
 
-/// What is likely wrong at a place (bytes from the start) of a text in TOML or JSON; `other` where nothing is known of it.
+/// What is likely wrong at a place (bytes from the start) of a text in TOML or JSON; `other` where nothing is known
+/// of it.
 pub fn slip_at<'a>(text: &str, place: usize, other: &'a str) -> &'a str {
     let before = text.get(..place).unwrap_or(text);
     slip_in(text, before.matches('\n').count() + 1, other)

@@ -1,5 +1,5 @@
-//! In: the text of a table: a line a row, cells parted by a sign or by white space, quoted or not, lines of comment behind `#`. Out: its
-//! rows with the lines that they stand on.
+//! In: the text of a table: a line a row, cells parted by a sign or by white space, quoted or not, lines of comment
+//! behind `#`. Out: its rows with the lines that they stand on.
 //! Frame and unit: none; cells are text.
 
 /// A row of a table.
@@ -13,8 +13,8 @@ pub struct TableRow {
     pub cells: Vec<String>,
 }
 
-/// Rows of any length, in order; empty lines and comments are none, and no row goes over a line's end. `separator` is one ASCII character;
-/// a space stands for any white space. A mark of the byte order says nothing in UTF-8.
+/// Rows of any length, in order; empty lines and comments are none, and no row goes over a line's end. `separator` is
+/// one ASCII character; a space stands for any white space. A mark of the byte order says nothing in UTF-8.
 pub fn table(text: &str, separator: char) -> Vec<TableRow> {
     let lines = (1..).zip(text.trim_start_matches('\u{feff}').lines().map(str::trim));
     let rows = lines.filter(|(_, l)| !l.is_empty() && !l.starts_with('#'));

@@ -1,5 +1,5 @@
-//! In: files made in a folder of their own. Out: all of them under their names in the folder above, or none, whenever the
-//! program is stopped.
+//! In: files made in a folder of their own. Out: all of them under their names in the folder above, or none, whenever
+//! the program is stopped.
 //! Frame and unit: none.
 
 use super::folder::sync_folder;
@@ -8,9 +8,10 @@ use crate::fault::{Fault, Result};
 use std::io::Result as Io;
 use std::path::{Path, PathBuf};
 
-/// A set of files that belong together, in `folder`. They are made in `NAME.part`. That folder's renaming to `NAME.whole`
-/// is the moment from which the new ones count: the former ones are put away, it becomes `NAME.moving`, and its files move
-/// up. Whoever reads the folder calls [`Together::settle`] first, which ends what a stopped process has begun.
+/// A set of files that belong together, in `folder`. They are made in `NAME.part`. That folder's renaming to
+/// `NAME.whole` is the moment from which the new ones count: the former ones are put away, it becomes `NAME.moving`,
+/// and its files move up. Whoever reads the folder calls [`Together::settle`] first, which ends what a stopped
+/// process has begun.
 pub struct Together<'a> {
     folder: &'a Path,
     name: &'a str,
@@ -50,8 +51,8 @@ impl<'a> Together<'a> {
         Ok(part)
     }
 
-    /// Gives the files in [`Together::part`], each of them on the disk already, their names. The caller holds the folder's
-    /// lock.
+    /// Gives the files in [`Together::part`], each of them on the disk already, their names. The caller holds the
+    /// folder's lock.
     pub fn commit(&self) -> Result<()> {
         let done = sync_folder(&self.part())
             .and_then(|()| rename(&self.part(), &self.at("whole")))

@@ -190,7 +190,8 @@ impl Scene {
         }
         scene
     }
-    /// The same, with every missing cell holding the value of a nearest one that is there, in steps along columns and rows.
+    /// The same, with every missing cell holding the value of a nearest one that is there, in steps along columns and
+    /// rows.
     pub fn carried_on(mut self) -> Scene {
         self.layers.iter_mut().for_each(Layer::carry_on);
         self

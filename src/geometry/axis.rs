@@ -1,5 +1,5 @@
-//! In: direction and pitch of a linear axis or turntable before a camera. Out: how a part that rides on it stands at a count, and
-//! how an error of each parameter moves it.
+//! In: direction and pitch of a linear axis or turntable before a camera. Out: how a part that rides on it stands at
+//! a count, and how an error of each parameter moves it.
 //! Frame and unit: camera, axis (the part's side at count 0), mm, rad; docs/math.md, Axis.
 
 use super::{Board, Camera, Mat3, Ride, Rigid, Twist, Vec3, exp, log};
@@ -52,8 +52,8 @@ impl CountUnit {
     }
 }
 
-/// A linear axis or turntable as a fixed camera sees it. Where the axis carries the sensor it is the same: the part moves against
-/// the camera.
+/// A linear axis or turntable as a fixed camera sees it. Where the axis carries the sensor it is the same: the part
+/// moves against the camera.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Axis {
@@ -87,14 +87,14 @@ pub struct Riding {
 const ALONG: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 impl Axis {
-    /// The axis frame by the board that rode at count 0 there (docs/conventions.md): its z leads out of the board's face, on
-    /// a turntable to the side that the camera stands on.
+    /// The axis frame by the board that rode at count 0 there (docs/conventions.md): its z leads out of the board's
+    /// face, on a turntable to the side that the camera stands on.
     pub fn from_board(r: &Riding, camera_from_board: &Rigid<Camera, Board>) -> Axis {
         let at = camera_from_board.translation;
         let column = |k: usize| -> Vec3 { camera_from_board.rotation.column(k).into() };
         let across = |v: Vec3, along: &Vec3| v - along * along.dot(&v);
-        // The second only where the first leads along: a board may stand upright. Which of two lies more across would be chance, and the
-        // frame would be another one after the next calibration.
+        // The second only where the first leads along: a board may stand upright. Which of two lies more across would
+        // be chance, and the frame would be another one after the next calibration.
         let cleaner = |a: Vec3, b: Vec3, along: &Vec3| if a.dot(along).abs() < ALONG { a } else { b };
         let forward = r.pitch >= 0.0;
         let (rotation, origin, pitch) = match r.kind {
@@ -152,8 +152,9 @@ impl Axis {
         by.dot(&self.direction()) / self.pitch
     }
 
-    /// How a part measured at a count is off, in axis coordinates, for an error of one in each of dx dy dz (direction, camera
-    /// frame), pitch, and for a turntable px py pz (origin, camera frame, mm). The frame at count 0 stays.
+    /// How a part measured at a count is off, in axis coordinates, for an error of one in each of dx dy dz
+    /// (direction, camera frame), pitch, and for a turntable px py pz (origin, camera frame, mm). The frame at count
+    /// 0 stays.
     pub fn errors(&self, count: f64) -> Vec<Twist> {
         let (d, p, by) = (self.direction(), self.origin(), self.pitch * count);
         let unit = |k: usize| Vec3::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
@@ -202,7 +203,8 @@ mod tests {
         }
     }
 
-    /// A board that lies tilted by as much about its x as about its y, measured a little wrong each time: the same frame.
+    /// A board that lies tilted by as much about its x as about its y, measured a little wrong each time: the same
+    /// frame.
     #[test]
     fn the_frame_is_the_same_after_the_next_calibration() {
         for kind in [AxisKind::Linear, AxisKind::Turntable] {

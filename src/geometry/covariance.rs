@@ -6,8 +6,9 @@ use nalgebra::DMatrix;
 /// What rounding may leave of symmetry and of eigenvalues below zero, in correlations.
 const ROUNDING: f64 = 1e-6;
 
-/// What a matrix with a row and a column a name lacks of a covariance, to be read after "the covariance": numbers that are not finite,
-/// a variance below 0, no symmetry, correlations beyond 1, an eigenvalue below 0. `None` where it is one.
+/// What a matrix with a row and a column a name lacks of a covariance, to be read after "the covariance": numbers
+/// that are not finite, a variance below 0, no symmetry, correlations beyond 1, an eigenvalue below 0. `None` where
+/// it is one.
 pub fn not_a_covariance(names: &[impl AsRef<str>], c: &DMatrix<f64>) -> Option<String> {
     let n = names.len();
     assert_eq!((n, n), c.shape());

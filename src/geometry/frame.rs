@@ -17,8 +17,8 @@ macro_rules! frames {
 }
 
 frames! {
-    /// Where clouds and insertion poses live: the robot's base; in recordings of an axis the [`Ride`]'s frame, in those of a part
-    /// that the robot carries its flange's. Reports name which.
+    /// Where clouds and insertion poses live: the robot's base; in recordings of an axis the [`Ride`]'s frame, in
+    /// those of a part that the robot carries its flange's. Reports name which.
     Base = "base";
     /// The robot's mounting flange, which the robot reports its pose of.
     Flange = "flange";

@@ -79,7 +79,8 @@ pub fn repair(m: &Mat3) -> Result<Repaired> {
     let departure = (m.transpose() * m - Mat3::identity()).norm();
     if departure > ORTHONORMAL_REFUSE || m.determinant() < 0.0 {
         return Err(Fault::input(format!(
-            "a rotation is not orthonormal: |RᵀR − I| = {departure:.2e}, determinant {:.4}, limit {ORTHONORMAL_REFUSE:.0e}",
+            "a rotation is not orthonormal: |RᵀR − I| = {departure:.2e}, determinant {:.4}, limit \
+             {ORTHONORMAL_REFUSE:.0e}",
             m.determinant()
         ))
         .cause("columns and rows swapped, a left-handed frame, or too few digits printed")

@@ -1,11 +1,12 @@
-//! In: six small numbers. Out: a pose moved by them, the six that lead from one pose to another, and how a point follows.
-//! Two ways to read six numbers are two types, so that a covariance of one is not taken for the other's.
+//! In: six small numbers. Out: a pose moved by them, the six that lead from one pose to another, and how a point
+//! follows. Two ways to read six numbers are two types, so that a covariance of one is not taken for the other's.
 //! Frame and unit: the frame that the pose leads to; mm, rad (docs/math.md, Board pose).
 
 use super::{Frame, Mat3, Rigid, Vec3, exp, log, skew};
 use nalgebra::{Matrix3x6, Vector6};
 
-/// A motion of the whole body: a point P goes to exp(w) P + v, a pose to (exp(w), v) * pose. Small, that is P + v + w x P.
+/// A motion of the whole body: a point P goes to exp(w) P + v, a pose to (exp(w), v) * pose. Small, that is P + v + w
+/// x P.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Twist {
     /// mm.
@@ -24,8 +25,8 @@ impl Twist {
         let rotation = to.rotation * from.rotation.transpose();
         Twist { v: to.translation - rotation * from.translation, w: log(&rotation) }
     }
-    /// The steady motion that leads there within one unit of time, turning and shifting at once: of two places on one screw the nearer has its
-    /// share of the farther's. Rotations below half a turn.
+    /// The steady motion that leads there within one unit of time, turning and shifting at once: of two places on one
+    /// screw the nearer has its share of the farther's. Rotations below half a turn.
     pub fn steady<F: Frame>(to: &Rigid<F, F>) -> Twist {
         let w = log(&to.rotation);
         let (a, k) = (w.norm(), skew(&w));
@@ -52,8 +53,8 @@ impl Twist {
     }
 }
 
-/// A pose's two halves moved by themselves: t = t̂ + d, R = exp(r) R̂; the turn is about axes of the frame through the origin of
-/// what is posed.
+/// A pose's two halves moved by themselves: t = t̂ + d, R = exp(r) R̂; the turn is about axes of the frame through
+/// the origin of what is posed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeftStep {
     /// mm.

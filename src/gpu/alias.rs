@@ -19,13 +19,13 @@ struct Memory {
     bytes: u64,
     /// Its place in the adapter's list of memory types.
     kind: u32,
-    /// Vulkan's device, and the driver that holds its code, must outlive the memory: scans with an ambient picture crashed
-    /// at their end without it (tests/scan/inputs.rs).
+    /// Vulkan's device, and the driver that holds its code, must outlive the memory: scans with an ambient picture
+    /// crashed at their end without it (tests/scan/inputs.rs).
     _owner: wgpu::Device,
 }
 
-// SAFETY: the host's pointer is used under the rules of `Aliased::read` and `Aliased::write` only; Vulkan's handles may be
-// used by any thread.
+// SAFETY: the host's pointer is used under the rules of `Aliased::read` and `Aliased::write` only; Vulkan's handles
+// may be used by any thread.
 unsafe impl Send for Memory {}
 // SAFETY: as above; nothing of it changes after it was made.
 unsafe impl Sync for Memory {}
@@ -52,15 +52,16 @@ impl std::fmt::Debug for Aliased {
 /// A buffer on memory of its own; `None` where the adapter is not Vulkan's or the memory cannot be had.
 ///
 /// # Safety
-/// The buffer's usages are among those of a storage buffer that nobody maps, and the adapter shares its memory with the host.
+/// The buffer's usages are among those of a storage buffer that nobody maps, and the adapter shares its memory with
+/// the host.
 pub(super) unsafe fn buffer(
     device: &wgpu::Device,
     descriptor: &wgpu::BufferDescriptor,
     zeroed: bool,
 ) -> Option<(wgpu::Buffer, Arc<Aliased>)> {
     // SAFETY: nothing of the device is destroyed through this handle; what is made here is destroyed where a later step
-    // fails, else by `destroy`, which wgpu calls when no work uses the buffer any more. The memory is bound once, to a type
-    // that the buffer's requirements allow, and mapped as a whole while it lives.
+    // fails, else by `destroy`, which wgpu calls when no work uses the buffer any more. The memory is bound once, to
+    // a type that the buffer's requirements allow, and mapped as a whole while it lives.
     unsafe {
         let hal = device.as_hal::<Vulkan>()?;
         let (raw, instance) = (hal.raw_device().clone(), hal.shared_instance().raw_instance());
@@ -112,12 +113,12 @@ pub(super) unsafe fn buffer(
 }
 
 impl Aliased {
-    /// The same bytes as an image of at most `most` rows, of 2^ROW_LOG2 texels each, one after the other; `None` where the
-    /// adapter has no such image, or would lay it out in another way.
+    /// The same bytes as an image of at most `most` rows, of 2^ROW_LOG2 texels each, one after the other; `None`
+    /// where the adapter has no such image, or would lay it out in another way.
     ///
     /// # Safety
-    /// `device` is the one that the buffer was made on; nobody submits to its queue meanwhile; its dispatches run one after
-    /// the other, so that no barrier is needed between a write of the buffer and a read of the image.
+    /// `device` is the one that the buffer was made on; nobody submits to its queue meanwhile; its dispatches run one
+    /// after the other, so that no barrier is needed between a write of the buffer and a read of the image.
     pub(super) unsafe fn texels(&self, device: &wgpu::Device, texel: Texel, most: u32) -> Option<&wgpu::TextureView> {
         let slot = &self.views[texel as usize];
         if slot.get().is_none() {
@@ -139,8 +140,9 @@ impl Aliased {
             Texel::One => vk::Format::R32_UINT,
             Texel::Four => vk::Format::R32G32B32A32_UINT,
         };
-        // SAFETY: as in `buffer`; the adapter has such images, the memory's type is one that this image may lie on, the image
-        // lies within the memory, which it holds until it is destroyed, and it is in the layout that wgpu is told of.
+        // SAFETY: as in `buffer`; the adapter has such images, the memory's type is one that this image may lie on,
+        // the image lies within the memory, which it holds until it is destroyed, and it is in the layout that wgpu
+        // is told of.
         unsafe {
             let hal = device.as_hal::<Vulkan>()?;
             let (raw, instance) = (hal.raw_device().clone(), hal.shared_instance().raw_instance());
@@ -213,7 +215,8 @@ impl Aliased {
     /// Reads where the bytes lie.
     ///
     /// # Safety
-    /// As long as the bytes are borrowed no submitted work writes the buffer, and nobody calls [`Aliased::write`] there.
+    /// As long as the bytes are borrowed no submitted work writes the buffer, and nobody calls [`Aliased::write`]
+    /// there.
     pub(super) unsafe fn read(&self, range: std::ops::Range<usize>) -> &[u8] {
         assert!(range.start <= range.end && range.end as u64 <= self.memory.bytes, "{range:?} bytes");
         // SAFETY: inside the mapped memory, just checked, which stays mapped as long as `self` lives.

@@ -128,8 +128,7 @@ fn sorted(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
 fn chosen(wanted: Option<&str>) -> Result<wgpu::Adapter> {
     let all = sorted(&instance());
     let names: Vec<String> = all.iter().map(|a| a.get_info().name).collect();
-    all
-        .into_iter()
+    all.into_iter()
         .find(|a| wanted.is_none_or(|w| a.get_info().name.to_lowercase().contains(&w.to_lowercase())))
         .ok_or_else(|| match wanted {
             Some(w) if !names.is_empty() => {
@@ -138,7 +137,10 @@ fn chosen(wanted: Option<&str>) -> Result<wgpu::Adapter> {
             }
             _ => Fault::device("0 Vulkan, Metal or DX12 adapters found, 1 needed")
                 .cause("no GPU driver is installed")
-                .next("install one (Debian: apt install mesa-vulkan-drivers); what has --on runs without one, with --on cpu"),
+                .next(
+                    "install one (Debian: apt install mesa-vulkan-drivers); what has --on runs without one, with \
+                       --on cpu",
+                ),
         })
 }
 
@@ -240,8 +242,8 @@ impl Device {
         let access = if self.reads_texels { U::COPY_DST } else { U::MAP_WRITE };
         self.buffer(label, bytes, U::STORAGE | access | U::COPY_SRC, true)
     }
-    /// Where the host reads what stages wrote, on unified memory. What they did not write is undefined: such a buffer is sized
-    /// for the worst case, and memory that is never touched costs nothing.
+    /// Where the host reads what stages wrote, on unified memory. What they did not write is undefined: such a buffer
+    /// is sized for the worst case, and memory that is never touched costs nothing.
     pub fn readable_storage(&self, label: &str, bytes: u64) -> Result<Buffer> {
         use wgpu::BufferUsages as U;
         let access = if self.reads_texels { U::COPY_DST } else { U::MAP_READ };
@@ -276,7 +278,7 @@ impl Device {
             // SAFETY: a storage buffer that is not mapped, on a software adapter, whose memory is the host's.
             let made = unsafe { alias::buffer(&self.raw, &descriptor, zeroed) };
             let (raw, aliased) = made.ok_or_else(|| {
-                Fault::device(format!("{}: {size} bytes for '{label}' cannot be had", self.info.name))
+                Fault::device(format!("{}: {size} bytes for '{label}' cannot be allocated", self.info.name))
                     .cause("the memory ran out")
                     .next("close other programs; what has --on runs in less memory with --on cpu")
             })?;
@@ -290,8 +292,8 @@ impl Device {
     /// A buffer as an image; `None` where it is too large for one, or the adapter has none of that kind.
     pub(super) fn texels<'a>(&self, buffer: &'a Buffer, texel: Texel) -> Option<&'a wgpu::TextureView> {
         let _alone = self.submitting.lock().unwrap_or_else(PoisonError::into_inner);
-        // SAFETY: only buffers of this device are aliased, and only on a software adapter, which runs dispatches one after the
-        // other; all submissions take the lock.
+        // SAFETY: only buffers of this device are aliased, and only on a software adapter, which runs dispatches one
+        // after the other; all submissions take the lock.
         unsafe { buffer.aliased.as_ref()?.texels(&self.raw, texel, self.image_rows) }
     }
 
@@ -401,8 +403,9 @@ impl Buffer {
     pub(super) fn open(&self) -> Option<Mapping> {
         self.aliased.is_none().then(|| self.map(wgpu::MapMode::Write, 0..self.bytes))
     }
-    /// The host's writes to an open buffer, which is divided into parts of so many bytes: `fill` is given a part's number and
-    /// its writer (byte offset in the part, bytes), by several threads where there are `writers`. Closes it, failed or not.
+    /// The host's writes to an open buffer, which is divided into parts of so many bytes: `fill` is given a part's
+    /// number and its writer (byte offset in the part, bytes), by several threads where there are `writers`. Closes
+    /// it, failed or not.
     pub(super) fn fill(&self, parts: &[usize], writers: Option<&ThreadPool>, fill: &Fill) -> Result<()> {
         if let Some(host) = &self.aliased {
             let mut begin = 0;

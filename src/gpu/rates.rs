@@ -21,7 +21,8 @@ pub struct Rates {
 /// Batches under way, and those that are timed.
 const SLOTS: usize = 3;
 const ROUNDS: usize = 32;
-/// Bytes of a copy within the device, more than its caches hold, where it binds as many; and copies that are timed together.
+/// Bytes of a copy within the device, more than its caches hold, where it binds as many; and copies that are timed
+/// together.
 const COPY: u64 = 1 << 28;
 const COPIES: usize = 32;
 /// A stage copies faster than the command for it.

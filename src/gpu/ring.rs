@@ -25,8 +25,8 @@ pub struct Slot {
     at: Option<wgpu::SubmissionIndex>,
 }
 
-/// One large result, and where the host reads it when memory is not shared: as much as a batch in this place needed so far,
-/// for what the stages may write at most is many times that.
+/// One large result, and where the host reads it when memory is not shared: as much as a batch in this place needed
+/// so far, for what the stages may write at most is many times that.
 pub struct Output {
     pub buffer: Buffer,
     staging: Option<Buffer>,
@@ -55,8 +55,8 @@ impl Returned<'_> {
     }
 }
 
-/// Batches in flight, oldest first, each with what its owner wants back with it; no buffer is made after the start, but where
-/// results need more room than ever before.
+/// Batches in flight, oldest first, each with what its owner wants back with it; no buffer is made after the start,
+/// but where results need more room than ever before.
 pub struct Ring<T> {
     device: Device,
     /// Copy a batch, and what comes back, together where the device works for itself.
@@ -164,9 +164,10 @@ impl<T> Ring<T> {
         Ok((at, true))
     }
 
-    /// Fills the next free place, which is divided into parts of so many bytes; panics when there is no room. `fill` is given
-    /// the number of a part and a writer (byte offset in the part, bytes), by several threads where they do not take the
-    /// stages' time. Returns the place, whose work is started with `run`; `cargo` comes back with `finish`.
+    /// Fills the next free place, which is divided into parts of so many bytes; panics when there is no room. `fill`
+    /// is given the number of a part and a writer (byte offset in the part, bytes), by several threads where they do
+    /// not take the stages' time. Returns the place, whose work is started with `run`; `cargo` comes back with
+    /// `finish`.
     pub fn fill(&mut self, parts: &[usize], fill: &Fill, cargo: T) -> Result<usize> {
         self.device.alive()?;
         let (at, _) = self.next()?;
@@ -225,7 +226,8 @@ impl<T> Ring<T> {
         Ok(self.busy.front_mut().map(|(at, cargo)| (*at, cargo)))
     }
 
-    /// Gives the first `bytes[i]` bytes of each output of the oldest place to `read`, frees the place and gives its cargo back.
+    /// Gives the first `bytes[i]` bytes of each output of the oldest place to `read`, frees the place and gives its
+    /// cargo back.
     pub fn finish(&mut self, bytes: &[u64], mut read: impl FnMut(usize, Returned)) -> Result<T> {
         let (at, cargo) = self.busy.pop_front().expect("a place is busy");
         let (device, copiers, slot) = (&self.device, self.copiers.as_ref(), &mut self.slots[at]);

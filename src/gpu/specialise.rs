@@ -1,8 +1,9 @@
-//! In: a stage's WGSL and the values of its override constants. Out: its tree with these numbers put in, without the branches
-//! that they rule out, reading as texels what has a reader. Frame and unit: none.
+//! In: a stage's WGSL and the values of its override constants. Out: its tree with these numbers put in, without the
+//! branches that they rule out, reading as texels what has a reader. Frame and unit: none.
 //!
-//! A driver first writes out every call and only then finds out what is dead; until then each of its passes works on all of it.
-//! Mesa's software adapter (22.3) pays for that at every start: its cache on disk spares only the machine code behind it.
+//! A driver first writes out every call and only then finds out what is dead; until then each of its passes works on
+//! all of it. Mesa's software adapter (22.3) pays for that at every start: its cache on disk spares only the machine
+//! code behind it.
 
 use super::texels::{bind_images, read_texels};
 use naga::back::pipeline_constants::process_overrides;

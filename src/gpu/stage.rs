@@ -10,14 +10,15 @@ use std::sync::{Arc, LazyLock, OnceLock};
 use wgpu::naga;
 
 impl Stage {
-    /// The stage's tree with its override constants, reading `Access::Texels` bindings as texels, or as the arrays that they are.
+    /// The stage's tree with its override constants, reading `Access::Texels` bindings as texels, or as the arrays
+    /// that they are.
     pub fn tree(&self, texels: bool, overrides: &[(String, f64)]) -> naga::Module {
         let source = if texels { readers(self) + &self.source() } else { self.source() };
         specialised(&source, overrides)
     }
 
-    /// The stage with its override constants, compiled on another thread: who uses it first waits for it, or compiles it where
-    /// no thread was free.
+    /// The stage with its override constants, compiled on another thread: who uses it first waits for it, or compiles
+    /// it where no thread was free.
     pub fn pipeline(&self, device: &Device, overrides: &[(&str, f64)]) -> Result<Pipeline> {
         let overrides = overrides.iter().map(|&(name, value)| (name.into(), value)).collect();
         let pipeline = self.begun(device, device.reads_texels, overrides);
@@ -76,7 +77,8 @@ impl Stage {
     ) -> wgpu::ComputePipeline {
         let module = std::borrow::Cow::Owned(self.tree(texels, overrides));
         let source = wgpu::ShaderModuleDescriptor { label: Some(self.name), source: wgpu::ShaderSource::Naga(module) };
-        // A counter of turns in every loop keeps the driver from writing short loops out, and takes it longer to compile.
+        // A counter of turns in every loop keeps the driver from writing short loops out, and takes it longer to
+        // compile.
         let checks = wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..wgpu::ShaderRuntimeChecks::checked() };
         // SAFETY: every loop ends (tests/shader_contracts.rs); all other checks stay.
         let module = unsafe { device.create_shader_module_trusted(source, checks) };
@@ -116,8 +118,8 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
-    /// Binds buffers, or `(offset, size)` parts of them, in the order of the stage's list; gives what they are bound for:
-    /// the stage without texels where one of them cannot be had as an image.
+    /// Binds buffers, or `(offset, size)` parts of them, in the order of the stage's list; gives what they are bound
+    /// for: the stage without texels where one of them cannot be had as an image.
     pub(super) fn bind(&self, device: &Device, buffers: &[(&Buffer, u64, u64)]) -> (Arc<Compiled>, wgpu::BindGroup) {
         assert_eq!(buffers.len(), self.stage.bindings.len(), "{}: bindings", self.stage.name);
         let resource = |(i, (b, offset, size)): (usize, &(&'_ Buffer, u64, u64))| {

@@ -1,9 +1,9 @@
 //! In: the tree of a stage that reads arrays of words. Out: the same tree reading the same words as texels of an image.
 //! Frame and unit: words of 32 bits, alone or in vectors of 2 or 4.
 //!
-//! Mesa's software adapter reads a storage buffer one lane after the other, in a loop with a branch; a texel it gathers for
-//! all lanes at once. Stores are the other way round. So stages write buffers, and read them as images that lie on the
-//! same memory ([`super::alias`]); decision 0012 says how to measure it.
+//! Mesa's software adapter reads a storage buffer one lane after the other, in a loop with a branch; a texel it
+//! gathers for all lanes at once. Stores are the other way round. So stages write buffers, and read them as images
+//! that lie on the same memory ([`super::alias`]); decision 0012 says how to measure it.
 
 use super::description::{Access, Stage};
 use naga::proc::TypeResolution;
@@ -77,7 +77,8 @@ impl Element {
             _ => load("i"),
         };
         format!(
-            "\nvar {name}_image: texture_storage_2d<{format}, read>;\nfn {name}_texel(i: u32) -> {} {{\n    return {value};\n}}\n",
+            "\nvar {name}_image: texture_storage_2d<{format}, read>;\nfn {name}_texel(i: u32) -> {} {{\n    return \
+             {value};\n}}\n",
             self.ty
         )
     }
@@ -86,7 +87,13 @@ impl Element {
 /// The element of a binding's array; panics where a stage promises texels of what has none.
 fn element_of(stage: &Stage, binding: &str) -> Element {
     let found = ELEMENTS.into_iter().find(|e| stage.wgsl.contains(&e.declaration(binding)));
-    found.unwrap_or_else(|| panic!("{}: '{binding}' is no read-only array of u32, vec2<u32> or vec4<u32>", stage.name))
+    found.unwrap_or_else(|| {
+        panic!(
+            "{}: '{binding}' is not a read-only array of u32, vec2<u32> or \
+                                    vec4<u32>",
+            stage.name
+        )
+    })
 }
 
 /// What a binding's texels are.
@@ -94,8 +101,8 @@ pub(super) fn texel_of(stage: &Stage, binding: &str) -> Texel {
     element_of(stage, binding).texel
 }
 
-/// Images and readers for a stage's `Access::Texels` bindings: [`read_texels`] puts them to use. They stand before its text, because in
-/// the tree functions come after those that they call.
+/// Images and readers for a stage's `Access::Texels` bindings: [`read_texels`] puts them to use. They stand before
+/// its text, because in the tree functions come after those that they call.
 pub(super) fn readers(stage: &Stage) -> String {
     let bindings = stage.bindings.iter().filter(|b| b.access == Access::Texels);
     bindings.map(|b| element_of(stage, b.name).reader(b.name)).collect()
@@ -115,8 +122,8 @@ pub(super) fn bind_images(module: &mut Module) {
     }
 }
 
-/// Every load of an element of an array that has a reader becomes a call of it; the arrays themselves are left without use.
-/// `info` is of this module. Whether there was any.
+/// Every load of an element of an array that has a reader becomes a call of it; the arrays themselves are left
+/// without use. `info` is of this module. Whether there was any.
 pub(super) fn read_texels(module: &mut Module, info: &ModuleInfo) -> bool {
     let reader = |name: &str| module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name)).map(|(h, _)| h);
     let readers: Readers = module
@@ -293,7 +300,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         assert_eq!(["list_image", "pairs_image", "plain", "out"].map(bound), [0, 1, 2, 3].map(Some));
         assert_eq!(["list", "pairs"].map(bound), [None, None]);
         let body = format!("{:?}", module.entry_points[0].function.body);
-        // list twice and once in the loop, pairs twice in the loop and once, and the function that calls a reader itself.
+        // list twice and once in the loop, pairs twice in the loop and once, and the function that calls a reader
+        // itself.
         assert_eq!(body.matches("Call {").count(), 7, "{body}");
         // As it stands nothing is changed.
         assert!(format!("{:?}", specialised(TEXT, &[]).entry_points[0].function.body).matches("Call {").count() == 1);

@@ -48,8 +48,8 @@ const SLENDER: f64 = 3.0;
 
 /// A picture whose brightest pixel is below this share of full scale is dark.
 const DARK: f64 = 0.06;
-/// A picture is white with more than this share of its pixels saturated, or with its median above that share of full scale and
-/// nothing dark in it: black print on white paper is not.
+/// A picture is white with more than this share of its pixels saturated, or with its median above that share of full
+/// scale and nothing dark in it: black print on white paper is not.
 const WHITE: f64 = 0.2;
 const BRIGHT: f64 = 0.9;
 const NO_DARK: f64 = 0.5;
@@ -85,7 +85,8 @@ impl Light {
 }
 
 impl Light {
-    /// Likely cause and next step where the light is what is wrong: hardly any, or far too much. `None` where it is neither.
+    /// Likely cause and next step where the light is what is wrong: hardly any, or far too much. `None` where it is
+    /// neither.
     pub fn why(&self) -> Option<(&'static str, &'static str)> {
         let full = f64::from(self.full_scale);
         if f64::from(self.levels[2]) < DARK * full {
@@ -151,7 +152,7 @@ impl fmt::Display for Light {
         match self.bright {
             None => write!(f, "; nothing stands out"),
             Some(Bright { centre: [x, y], share, stripe: None }) => {
-                write!(f, "; {:.1} % of it stands out, about ({x:.0}, {y:.0}), and is no stripe", 100.0 * share)
+                write!(f, "; {:.1} % of it stands out, about ({x:.0}, {y:.0}), and is not a stripe", 100.0 * share)
             }
             Some(Bright { centre: [x, y], stripe: Some(s), .. }) => {
                 let (way, place) = if s.upright { ("upright", x) } else { ("lying", y) };

@@ -1,5 +1,5 @@
-//! In: pictures of a camera that bends its levels (sRGB, a gamma). Out: the same pictures with levels in proportion to the
-//! light, through a table.
+//! In: pictures of a camera that bends its levels (sRGB, a gamma). Out: the same pictures with levels in proportion
+//! to the light, through a table.
 //! Frame and unit: grey levels; 8 bits become 12, deeper ones 16, so that dark levels stay apart.
 
 use super::{Image, Pixels};
@@ -95,9 +95,9 @@ impl Response {
         // Slope of light over level at the top, where a stripe's peak is.
         let steep = (self.light(1.0) - self.light(0.999)) / 0.001;
         Some(format!(
-            "the pictures follow {name} and were made linear at load, {bits} bits to {}: near full scale one of their levels \
-             is {steep:.1} linear ones, so bright pixels are that much coarser and noisier than a linear camera's; saturated \
-             ones stay saturated",
+            "the pictures follow {name} and were made linear at load, {bits} bits to {}. Near full scale one of \
+             their levels is {steep:.1} linear ones, so bright pixels are coarser and noisier than a linear camera's. \
+             Saturated pixels stay saturated",
             self.depth(bits)
         ))
     }

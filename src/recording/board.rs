@@ -36,8 +36,9 @@ pub enum BoardSpec {
         /// Id of the first marker; the others follow row by row.
         #[serde(default, skip_serializing_if = "is_zero")]
         first_id: u32,
-        /// Colour of the square at the origin. Unstated: the markers' ids tell it in each picture. OpenCV draws "black" since
-        /// 4.6; before, and as its "legacy pattern", boards with an even number of rows begin with "white".
+        /// Colour of the square at the origin. Unstated: the markers' ids tell it in each picture. OpenCV draws
+        /// "black" since 4.6; before, and as its "legacy pattern", boards with an even number of rows begin with
+        /// "white".
         #[serde(default, skip_serializing_if = "Option::is_none")]
         first_square: Option<String>,
         /// Plain margin around the outer squares, mm, 0..=10000; 0 unless stated.
@@ -93,7 +94,7 @@ impl BoardSpec {
     pub fn load(path: &Path) -> Result<BoardSpec> {
         let text = crate::files::read_text(path)?;
         let board: BoardSpec = serde_json::from_str(&text).map_err(|e| {
-            Fault::input(format!("{}: is no board description: {e}", path.display()))
+            Fault::input(format!("{}: is not a board description: {e}", path.display()))
                 .cause(crate::files::slip_in(&text, e.line(), "a misspelt key or a missing size"))
                 .next("compare it with docs/file-formats.md, or write one with sheetlight board")
         })?;
@@ -153,14 +154,14 @@ impl BoardSpec {
         }
     }
 
-    /// Whether the square at a ChArUco board's origin is white, and so holds a marker. A board that leaves its first square open
-    /// is drawn with a black one.
+    /// Whether the square at a ChArUco board's origin is white, and so holds a marker. A board that leaves its first
+    /// square open is drawn with a black one.
     pub fn begins_white(&self) -> bool {
         matches!(self, BoardSpec::Charuco { first_square: Some(colour), .. } if colour == "white")
     }
 
-    /// A picture of part of this ChArUco board may not tell the colour of its first square, which the description leaves open:
-    /// with odd columns and even rows one order of markers is the other, shifted by a column.
+    /// A picture of part of this ChArUco board may not tell the colour of its first square, which the description
+    /// leaves open: with odd columns and even rows one order of markers is the other, shifted by a column.
     pub fn first_square_may_stay_open(&self) -> bool {
         match self {
             BoardSpec::Charuco { squares: [columns, rows], first_square: None, .. } => {
@@ -170,7 +171,8 @@ impl BoardSpec {
         }
     }
 
-    /// A ChArUco board whose description leaves its first square open, with that square as `white` says; any other board as it is.
+    /// A ChArUco board whose description leaves its first square open, with that square as `white` says; any other
+    /// board as it is.
     pub fn beginning(&self, white: bool) -> BoardSpec {
         let mut board = self.clone();
         if let BoardSpec::Charuco { first_square: open @ None, .. } = &mut board {

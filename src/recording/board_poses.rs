@@ -23,20 +23,22 @@ pub fn load_board_poses(path: &Path) -> Result<Vec<(usize, Rigid<Camera, Board>)
 }
 
 fn read(text: &str, json: bool) -> Result<Vec<(usize, Rigid<Camera, Board>)>> {
-    let rows = if json {
-        json_rows(text, TRANSFORM)?
-    } else {
-        let stated = text.lines().find_map(|l| l.trim().strip_prefix('#')?.trim().strip_prefix("transform:"));
-        if stated.map(str::trim) != Some(TRANSFORM) {
-            return Err(Fault::input(match stated {
+    let rows =
+        if json {
+            json_rows(text, TRANSFORM)?
+        } else {
+            let stated = text.lines().find_map(|l| l.trim().strip_prefix('#')?.trim().strip_prefix("transform:"));
+            if stated.map(str::trim) != Some(TRANSFORM) {
+                return Err(Fault::input(match stated {
                 Some(other) => format!("transform is '{}', only '{TRANSFORM}' is read", other.trim()),
                 None => "does not say what its poses are".into(),
             })
-            .cause("a board's pose may be written as camera_T_board or the other way round, and this program does not guess")
-            .next(format!("put a line '# transform: {TRANSFORM}' first, with poses that map board to camera coordinates")));
-        }
-        pose_csv::read(text)?.rows
-    };
+            .cause("a board's pose may be written as camera_T_board or board_T_camera, and this program does not guess")
+            .next(format!("put a line '# transform: {TRANSFORM}' first, with poses that map board to camera \
+                           coordinates")));
+            }
+            pose_csv::read(text)?.rows
+        };
     let mut out: Vec<(usize, Rigid<Camera, Board>)> = Vec::new();
     for (number, convention, numbers) in rows {
         if out.iter().any(|(n, _)| *n == number) {
@@ -87,7 +89,8 @@ mod tests {
     fn json_names_its_transform() {
         let json = |transform: &str| {
             let text = format!(
-                "{{\"units\":\"mm\",\"layout\":\"row-major 4x4\",\"transform\":\"{transform}\",\"poses\":[{{\"frame\":4,\"matrix\":[{ROW}]}}]}}"
+                "{{\"units\":\"mm\",\"layout\":\"row-major \
+                 4x4\",\"transform\":\"{transform}\",\"poses\":[{{\"frame\":4,\"matrix\":[{ROW}]}}]}}"
             );
             read(&text, true)
         };

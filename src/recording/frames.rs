@@ -1,4 +1,5 @@
-//! In: a file with one frame a line, as a recorder writes it while it runs. Out: the frames; a last line that was cut off is none.
+//! In: a file with one frame a line, as a recorder writes it while it runs. Out: the frames; a last line that was cut
+//! off is none.
 //! Frame and unit: as `frames` of meta.json.
 
 use super::frame::FrameRef;
@@ -23,9 +24,9 @@ pub(super) fn load(path: &Path) -> Result<Vec<FrameRef>> {
             return Ok(frames);
         }
         let frame = serde_json::from_slice(&line).map_err(|e| {
-            Fault::input(format!("{}: line {} is no frame: {e}", path.display(), frames.len() + 1))
+            Fault::input(format!("{}: line {} is not a frame: {e}", path.display(), frames.len() + 1))
                 .cause("the file was edited, or the disk failed")
-                .next("correct the line, or leave it out")
+                .next("correct or remove the line")
         })?;
         frames.push(frame);
     }
@@ -61,9 +62,9 @@ impl FollowedFrames {
             self.next += 1;
         }
         serde_json::from_slice(&self.line).map_err(|e| {
-            Fault::input(format!("{}: line {} is no frame: {e}", self.path.display(), index + 1))
+            Fault::input(format!("{}: line {} is not a frame: {e}", self.path.display(), index + 1))
                 .cause("another program writes into the recording, or the disk failed")
-                .next("see the disk; what was recorded before can be scanned")
+                .next("check the disk; the finished part can be scanned")
         })
     }
 }

@@ -37,7 +37,10 @@ impl Markers {
             _ => return Ok(None),
         };
         let codes = resolve_dictionary(name).ok_or_else(|| {
-            Fault::usage(format!("'{name}' is no known marker dictionary")).next("use OpenCV's name, e.g. DICT_5X5_250")
+            Fault::usage(format!("'{name}' is not a known marker dictionary")).next(
+                "use OpenCV's name, e.g. \
+                DICT_5X5_250",
+            )
         })?;
         let all = cells[0] as usize * cells[1] as usize;
         // The colour of the first square has one square more where their number is odd.

@@ -163,8 +163,8 @@ impl Meta {
         Meta::parse(&text).map_err(|e| e.at(path.display()))
     }
 
-    /// Parses and checks; refuses unknown keys, units, formats and pixel conventions. What a frames_file holds is read and checked
-    /// by [`super::Recording::open`].
+    /// Parses and checks; refuses unknown keys, units, formats and pixel conventions. What a frames_file holds is
+    /// read and checked by [`super::Recording::open`].
     pub fn parse(text: &str) -> Result<Meta> {
         // A mark of the byte order says nothing in UTF-8.
         let meta: Meta = serde_json::from_str(text.trim_start_matches('\u{feff}')).map_err(|e| {
@@ -180,7 +180,7 @@ impl Meta {
             meta.check()?;
         } else if !meta.frames.is_empty() {
             return Err(Fault::input("frames are in meta.json and in a frames_file")
-                .cause("meta.json was edited, or put together of two")
+                .cause("meta.json was edited, or merged from two files")
                 .next("leave one of them out"));
         }
         Ok(meta)

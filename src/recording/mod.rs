@@ -51,7 +51,7 @@ impl Recording {
     /// Opens a folder and checks `meta.json`.
     pub fn open(folder: &Path) -> Result<Recording> {
         if !folder.is_dir() {
-            return Err(Fault::input(format!("{}: is no folder", folder.display()))
+            return Err(Fault::input(format!("{}: is not a folder", folder.display()))
                 .cause("a recording is a folder with meta.json, pictures and poses")
                 .next("give the folder, not one of its files"));
         }
@@ -63,13 +63,13 @@ impl Recording {
             if !inside.is_empty() {
                 inside.sort_by_key(|p| crate::files::natural(&p.to_string_lossy()));
                 let names: Vec<String> = inside.iter().map(|p| p.display().to_string()).collect();
-                return Err(Fault::input(format!("{}: holds no meta.json", folder.display()))
+                return Err(Fault::input(format!("{}: contains no meta.json", folder.display()))
                     .cause("it is the folder above the recordings")
                     .next(format!("give the recording itself: {}", names.join(", "))));
             }
             let files = entries.len();
-            return Err(Fault::input(format!("{}: holds no meta.json; {files} other files", folder.display()))
-                .cause("an empty folder, pictures that nobody described, or the folder above the recording")
+            return Err(Fault::input(format!("{}: contains no meta.json; {files} other files", folder.display()))
+                .cause("an empty folder, pictures without a description, or the folder above the recording")
                 .next("write meta.json as docs/file-formats.md shows: the picture's size, the board, the frames"));
         }
         let meta = Meta::load(&path)?;
@@ -106,7 +106,7 @@ impl Recording {
         match self.meta.beam.filter(|b| *b != wanted) {
             None => Ok(()),
             Some(other) => Err(Fault::input(format!(
-                "{}: its laser pictures show the {}, the {} is wanted here",
+                "{}: its laser pictures show the {}, the {} is needed here",
                 self.folder.display(),
                 name(other),
                 name(wanted)
@@ -135,12 +135,12 @@ impl Recording {
             return Ok(path);
         }
         Err(Fault::input(format!("{}: '{name}' lies outside the recording", self.folder.display()))
-            .cause("meta.json was written by somebody else, or the pictures are links to another place")
-            .next("copy the pictures into the recording, or scan with --pictures-outside where that is meant"))
+            .cause("meta.json comes from elsewhere, or the pictures are links to another place")
+            .next("copy the pictures into the recording, or allow it with --pictures-outside"))
     }
 
-    /// Reads a picture of the recording's camera from anywhere, its levels made linear; of another size than meta.json says
-    /// none is decoded.
+    /// Reads a picture of the recording's camera from anywhere, its levels made linear; of another size than
+    /// meta.json says none is decoded.
     pub fn load(&self, path: &Path) -> Result<Image> {
         let spec = &self.meta.image;
         let depth = Depth {
@@ -160,8 +160,8 @@ impl Recording {
         Ok(spec.response.linear(raw::load(&path, number, [spec.width, spec.height], spec.bits)?))
     }
 
-    /// Which of `poses` the robot stood at in frame `index`. Frames that do not say are paired in order, and then there must
-    /// be as many poses as frames.
+    /// Which of `poses` the robot stood at in frame `index`. Frames that do not say are paired in order, and then
+    /// there must be as many poses as frames.
     pub fn pose_of<'a, T>(&self, index: usize, poses: &'a [T]) -> Result<&'a T> {
         let frame = &self.meta.frames[index];
         let frames = self.meta.frames.len();
@@ -170,7 +170,7 @@ impl Recording {
                 "frame {index} names no pose; there are {frames} frames and {} poses",
                 poses.len()
             ))
-            .cause("a picture or a pose was lost on the way, so nobody knows which belong together")
+            .cause("a picture or a pose was lost, so it is unknown which belong together")
             .next("write \"pose\" into every frame of meta.json"));
         }
         let k = frame.pose.unwrap_or(index);
@@ -186,7 +186,8 @@ impl Recording {
         self.pose_file(name).map(|f| f.poses)
     }
 
-    /// The poses in file `name` (without extension), or in the file that meta.json names, and what a person should know of them.
+    /// The poses in file `name` (without extension), or in the file that meta.json names, and what a person should
+    /// know of them.
     pub fn pose_file(&self, name: Option<&str>) -> Result<PoseFile> {
         if name.is_none() && self.meta.pose_file.is_none() {
             let poses = self.carried();

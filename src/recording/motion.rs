@@ -115,7 +115,7 @@ impl Motion {
         }
         let numbers = [self.zero, self.counts_per_shot].into_iter().chain(frames.iter().map(|f| f.count)).flatten();
         if let Some(odd) = numbers.into_iter().find(|c| !(c.abs() <= MOST)) {
-            let what = format!("a count of {odd} {}, at most {MOST:.0} is believed", unit.name());
+            let what = format!("a count of {odd} {}, at most {MOST:.0} is accepted", unit.name());
             return bad(what, "write counts as the encoder gives them, or set \"zero\" nearer");
         }
         if self.counts_per_shot == Some(0.0) {

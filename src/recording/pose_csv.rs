@@ -1,5 +1,5 @@
-//! In: a pose file in CSV. Out: numbered rows of numbers in the convention that the file names; columns, units and order must
-//! be that convention's.
+//! In: a pose file in CSV. Out: numbered rows of numbers in the convention that the file names; columns, units and
+//! order must be that convention's.
 //! Frame and unit: as the convention says (docs/conventions.md).
 
 use crate::fault::{Fault, Result};
@@ -70,12 +70,12 @@ fn column(cell: &str) -> (String, Option<String>) {
 impl Header {
     fn read(TableRow { text: line, cells, .. }: &TableRow, convention: Option<Convention>) -> Result<Header> {
         if cells.len() < 2 && line.contains([';', '\t']) {
-            return Err(Fault::input("columns are parted by semicolons or tabs, only commas are read")
+            return Err(Fault::input("columns are separated by semicolons or tabs, only commas are read")
                 .cause("exported by a spreadsheet whose numbers have decimal commas")
                 .next("export with commas between columns and points in numbers"));
         }
         if cells.iter().all(|c| c.parse::<f64>().is_ok()) {
-            return Err(Fault::input(format!("'{line}' is numbers where the columns should be named"))
+            return Err(Fault::input(format!("'{line}' contains numbers instead of column names"))
                 .cause("the header line is missing")
                 .next("put a header first, e.g. frame,X_mm,Y_mm,Z_mm,RX_deg,RY_deg,RZ_deg"));
         }
@@ -96,7 +96,7 @@ impl Header {
         let layout = format!("frame,{}", convention.labels().join(",").replace(' ', "_"));
         let other = |what: String, cause: &str| {
             Err(Fault::input(what).cause(cause.to_owned()).next(format!(
-                "name the convention that the file is in, or put the columns as {} has them: {layout}",
+                "name the file's convention, or order the columns as {} does: {layout}",
                 convention.name()
             )))
         };

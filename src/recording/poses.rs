@@ -114,16 +114,19 @@ fn collect(rows: Vec<Row>) -> Result<PoseFile> {
             _ => 0.0,
         };
         if departure > ORTHONORMAL_WARN {
-            out.warnings.push(format!("pose {index}: rotation repaired, it was {departure:.1e} from orthonormal (limit {ORTHONORMAL_WARN:.0e})"));
+            out.warnings.push(format!(
+                "pose {index}: rotation repaired, it was {departure:.1e} from orthonormal \
+                                       (limit {ORTHONORMAL_WARN:.0e})"
+            ));
         }
         let pose = convention.read(&numbers).map_err(|e| e.at(format!("pose {index}")))?;
         let far = pose.translation.norm();
         if far > FARTHEST {
             return Err(Fault::input(format!(
-                "pose {index}: the flange is {far:.0} mm from its base, at most {FARTHEST:.0} is believed"
+                "pose {index}: the flange is {far:.0} mm from its base, at most {FARTHEST:.0} is accepted"
             ))
             .cause("millimetres written as micrometres, a number without its decimal point, or a spoilt file")
-            .next("correct the pose, or leave its frame out of meta.json"));
+            .next("correct the pose, or remove its frame from meta.json"));
         }
         out.poses.push(pose);
     }
@@ -138,7 +141,8 @@ impl PoseFile {
         let reach = self.poses.iter().map(|p| p.translation.norm()).fold(0.0, f64::max);
         (self.poses.len() > 2 && reach < METRES).then(|| {
             format!(
-                "all {} poses lie within {reach:.2} mm of the base's origin: they look like metres, and are read as millimetres",
+                "all {} poses lie within {reach:.2} mm of the base's origin: they look like metres, and are read as \
+                 millimetres",
                 self.poses.len()
             )
         })
@@ -155,7 +159,7 @@ fn from_csv(text: &str) -> Result<PoseFile> {
     match file.metres() {
         Some(what) if !read.length_stated => Err(Fault::refused(what)
             .cause("positions in metres under a convention in millimetres")
-            .next("convert them, or write the unit into the header where they are right: X_mm,Y_mm,Z_mm")),
+            .next("convert them, or state the unit in the header if they are correct: X_mm,Y_mm,Z_mm")),
         _ => Ok(file),
     }
 }
@@ -170,9 +174,7 @@ fn looks_like_another_unit(convention: Convention, rows: &[Row]) -> Result<()> {
     let asked = |is: &str, want: &str| {
         Err(Fault::refused(format!("no angle is above {largest:.3} in {} poses: {is}, {name} has {want}", rows.len()))
             .cause(format!("the file is in {is} or of another convention"))
-            .next(format!(
-                "name the right convention, or write the unit into the header where it is right: {column},..."
-            )))
+            .next(format!("name the right convention, or state the unit in the header if it is correct: {column},...")))
     };
     if degrees && largest > 0.0 && largest < 7.0 {
         return asked("radians", "degrees");
@@ -180,7 +182,7 @@ fn looks_like_another_unit(convention: Convention, rows: &[Row]) -> Result<()> {
     if !degrees && largest > TURN + 0.01 {
         return Err(Fault::refused(format!("an angle is {largest:.3}, above a turn in radians, which {name} has"))
             .cause("the file is in degrees")
-            .next(format!("convert it, or write the unit into the header where it is right: {column},...")));
+            .next(format!("convert it, or state the unit in the header if it is correct: {column},...")));
     }
     Ok(())
 }

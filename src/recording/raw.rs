@@ -18,7 +18,8 @@ pub fn raw_name(file: &str, number: u64) -> String {
     format!("{file}#{number}")
 }
 
-/// Reads frame `number` of a file of frames of this size and depth. Refused: a file that ends before it, a level above the depth.
+/// Reads frame `number` of a file of frames of this size and depth. Refused: a file that ends before it, a level
+/// above the depth.
 pub(super) fn load(path: &Path, number: u64, [width, height]: [u32; 2], bits: u8) -> Result<Image> {
     let bytes = width as usize * height as usize * if bits > 8 { 2 } else { 1 };
     let mut file = std::fs::File::open(path).map_err(|e| Fault::read(path, e))?;
@@ -32,7 +33,7 @@ pub(super) fn load(path: &Path, number: u64, [width, height]: [u32; 2], bits: u8
             path.display()
         ))
         .cause("the recording was cut off, or meta.json is of another one")
-        .next("leave the shot out with --skip-bad, or record again")
+        .next("exclude the shot with --skip-bad, or record again")
     })?;
     if bits == 8 {
         return Ok(Image::from_u8(width, height, frame));

@@ -10,9 +10,9 @@ use crate::fault::{Fault, Result};
 /// Both say it.
 pub fn stated_once(source: Option<Readout>, word: Option<Readout>) -> Result<Option<Readout>> {
     if let (Some(known), Some(word)) = (source, word) {
-        return Err(Fault::usage(format!("the pictures say how they were read, {known}; stated is {word}"))
+        return Err(Fault::usage(format!("the recording states the readout {known}, but the option states {word}"))
             .cause("--region and --binned are for pictures that say nothing")
-            .next("leave --region and --binned out"));
+            .next("omit --region and --binned"));
     }
     Ok(source.or(word))
 }

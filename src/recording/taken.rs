@@ -1,5 +1,5 @@
-//! In: what is known of how a frame came: numbers, clocks, pairing. Out: the `taken` of a frame; where what moves stood, and how far
-//! that may be off because the time is uncertain.
+//! In: what is known of how a frame came: numbers, clocks, pairing. Out: the `taken` of a frame; where what moves
+//! stood, and how far that may be off because the time is uncertain.
 //! Frame and unit: times in ns, the device's by its own clock, the host's since the Unix epoch; base_from_flange, mm.
 
 use super::stand::Stand;
@@ -20,8 +20,8 @@ pub enum Pairing {
     Given,
 }
 
-/// A small motion: how far a stand may be off because nobody knows the time of the picture better (one standard deviation), or what moves
-/// does in a second.
+/// A small motion: how far a stand may be off because nobody knows the time of the picture better (one standard
+/// deviation), or what moves does in a second.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Slip {
@@ -107,8 +107,8 @@ impl Taken {
         Some(self.rate?.times(1e-9 * self.time_sigma_ns?))
     }
 
-    /// Where what moves stood, and how far that may be off, if the picture's time was late by `delay_ns`, known to `sigma_ns`, whatever was
-    /// thought of that when it was recorded; as it is for all but the pairing by clock.
+    /// Where what moves stood, and how far that may be off, if the picture's time was late by `delay_ns`, known to
+    /// `sigma_ns`, whatever was thought of that when it was recorded; as it is for all but the pairing by clock.
     pub fn delayed(&self, stand: &Stand, delay_ns: f64, sigma_ns: f64) -> (Stand, Option<Slip>) {
         let (Some(rate), Some(time), Some(former)) = (self.rate, self.time_sigma_ns, self.delay_ns) else {
             return (*stand, self.slip());

@@ -66,8 +66,8 @@ pub const ROBOT_SIGMA_DEG: &str = "robot_sigma_deg";
 
 /// A calibrated value with its origin. `T` is `Intrinsics`, `Plane<Camera>`, `Ray<Camera>` or `HandEye`.
 ///
-/// Covariance parameters by kind: [`Kind::parameters`]; a laser plane's has rank 3, along the tangent of the unit normal, a
-/// pointer's beam rank 4; hand-eye see [`HandEye`].
+/// Covariance parameters by kind: [`Kind::parameters`]; a laser plane's has rank 3, along the tangent of the unit
+/// normal, a pointer's beam rank 4; hand-eye see [`HandEye`].
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration<T> {
@@ -148,7 +148,8 @@ impl<T> Calibration<T> {
 }
 
 impl<T: Measured> Calibration<T> {
-    /// Refuses a record of another kind, frame or format, a value or covariance that is none, and what its own solver refused.
+    /// Refuses a record of another kind, frame or format, a value or covariance that is none, and what its own solver
+    /// refused.
     pub fn check(&self, kind: Kind) -> Result<()> {
         if self.format != FORMAT || self.kind != kind || self.frame != kind.place() {
             return Err(Fault::input(format!(
@@ -160,11 +161,11 @@ impl<T: Measured> Calibration<T> {
                 kind.place()
             ))
             .cause("calibration files were renamed or swapped")
-            .next("put the right file there, or calibrate again"));
+            .next("restore the right file, or calibrate again"));
         }
         if self.quality.verdict == Verdict::Refused {
             return Err(Fault::input(format!("was refused when it was made: {}", self.quality.reasons.join("; ")))
-                .cause("a result that determines nothing was put in place by hand")
+                .cause("a result that determines nothing was copied there by hand")
                 .next("calibrate again as its reasons advise"));
         }
         self.value.check()?;
@@ -184,8 +185,8 @@ pub fn axis_sigma(quality: &Quality) -> Option<[f64; 2]> {
 }
 
 impl Calibration<HandEye> {
-    /// Sigma of the robot per axis, mm and degrees, that the calibration found; `None` where the values come from elsewhere
-    /// and nothing is known of it.
+    /// Sigma of the robot per axis, mm and degrees, that the calibration found; `None` where the values come from
+    /// elsewhere and nothing is known of it.
     pub fn robot_sigma(&self) -> Result<Option<[f64; 2]>> {
         let of = |name: &str| self.quality.figures.get(name).copied();
         match (of(ROBOT_SIGMA_MM), of(ROBOT_SIGMA_DEG)) {

@@ -1,5 +1,5 @@
-//! In: calibrated values, from solvers, files and people. Out: a refusal of what no rig is, and a question about what looks
-//! like another unit.
+//! In: calibrated values, from solvers, files and people. Out: a refusal of what no rig is, and a question about what
+//! looks like another unit.
 //! Frame and unit: as the values; mm, px.
 
 use super::measured::Measured;
@@ -151,7 +151,7 @@ impl Measured for Axis {
         // A nanometre to a metre a count, and a turntable that does not pass half a turn a count.
         let most = if self.kind == AxisKind::Linear { 1e3 } else { std::f64::consts::PI };
         if !(self.pitch.abs() > 1e-9 && self.pitch.abs() < most) {
-            let what = format!("the pitch is {} a count, 1e-9 to {most:.4} is believed", self.pitch);
+            let what = format!("the pitch is {} a count, 1e-9 to {most:.4} is accepted", self.pitch);
             return Err(bad(what, "an axis that did not move, or another unit"));
         }
         Ok(())

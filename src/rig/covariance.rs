@@ -45,8 +45,8 @@ impl Covariance {
         DMatrix::from_fn(n, n, |i, j| self.matrix[i][j])
     }
 
-    /// Refuses what is no covariance of this kind's parameters: other names or another order, another shape, numbers that
-    /// are not finite, a matrix that is not symmetric or not positive semidefinite.
+    /// Refuses what is no covariance of this kind's parameters: other names or another order, another shape, numbers
+    /// that are not finite, a matrix that is not symmetric or not positive semidefinite.
     pub fn check(&self, kind: Kind) -> Result<()> {
         let bad = |what: String| {
             Err(Fault::input(format!("the covariance {what}"))

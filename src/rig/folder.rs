@@ -74,8 +74,8 @@ impl Rig {
         })
     }
 
-    /// For a calibration made with the camera: a spoilt former result is not in its own way, nor in another's. The laser plane,
-    /// where it can be read, says where the station works.
+    /// For a calibration made with the camera: a spoilt former result is not in its own way, nor in another's. The
+    /// laser plane, where it can be read, says where the station works.
     pub fn load_to_calibrate(station: &Path) -> Result<Rig> {
         Ok(Rig { laser_plane: load(station, Kind::LaserPlane).unwrap_or(None), ..Rig::load_camera(station)? })
     }
@@ -85,8 +85,9 @@ impl Rig {
         Ok(Rig { camera: load(station, Kind::Camera)?, ..Rig::default() })
     }
 
-    /// Stores one calibration under `station/calibration/<kind>.json` and, where there is one, its `page` beside it as `<kind>.html`; a former one
-    /// is kept as `<kind>.previous.json`. Either the new file is complete or the old one is untouched.
+    /// Stores one calibration under `station/calibration/<kind>.json` and, where there is one, its `page` beside it
+    /// as `<kind>.html`; a former one is kept as `<kind>.previous.json`. Either the new file is complete or the old
+    /// one is untouched.
     pub fn store<T: Serialize + Measured>(
         station: &Path,
         calibration: &Calibration<T>,
@@ -112,8 +113,8 @@ impl Rig {
         self.store_all_with(station, |_| Vec::new())
     }
 
-    /// [`Rig::store_all`] together with files (name, text) that are of these records and of no others; they are made from the rig as
-    /// a reader will find it: a rotation comes back from its file orthonormal to the last digit.
+    /// [`Rig::store_all`] together with files (name, text) that are of these records and of no others; they are made
+    /// from the rig as a reader will find it: a rotation comes back from its file orthonormal to the last digit.
     pub fn store_all_with(
         &self,
         station: &Path,
@@ -146,8 +147,8 @@ impl Rig {
         Ok(texts.into_iter().map(|(kind, _)| kind).collect())
     }
 
-    /// Seals a file anew that has no seal, was edited, or rests on another camera, because a person says why. The remark
-    /// stays with it. What is no calibration at all is refused even so.
+    /// Seals a file anew that has no seal, was edited, or rests on another camera, because a person says why. The
+    /// remark stays with it. What is no calibration at all is refused even so.
     pub fn vouch<T: Serialize + DeserializeOwned + Measured>(
         station: &Path,
         kind: Kind,
@@ -214,7 +215,7 @@ impl Rig {
         match (&self.linear_axis, &self.turntable) {
             (Some(_), Some(_)) => {
                 Err(Fault::refused("the rig has a linear axis and a turntable, one of them is needed")
-                    .cause("nothing says which of the two moved the part")
+                    .cause("it is unknown which of the two moved the part")
                     .next("take the parts of the rig that the recording's motion rests on"))
             }
             (linear, turntable) => Ok(linear.as_ref().or(turntable.as_ref())),
@@ -263,7 +264,7 @@ impl Rig {
             Some(then) => format!("the {what} was measured with camera {then:.12}, the station now has {now:.12}"),
             None => format!("the {what} names no camera, the station has camera {now:.12}"),
         })
-        .cause("the camera was calibrated or imported anew, or files of two stations were mixed")
+        .cause("the camera was calibrated or imported again, or files of two stations were mixed")
         .next(again(kind)))
     }
 
@@ -289,7 +290,8 @@ impl Rig {
         Some(stated.other(&now).map_or(Ok(stated), |kind| Err(other(kind))))
     }
 
-    /// What a report must say of the calibrations it rests on: what people have vouched for, and what is badly determined.
+    /// What a report must say of the calibrations it rests on: what people have vouched for, and what is badly
+    /// determined.
     pub fn remarks(&self) -> Vec<String> {
         let of = |r: Record| {
             let mut said: Vec<String> = r.remarks.iter().map(|said| format!("{}: {said}", r.kind.words())).collect();
@@ -327,7 +329,7 @@ pub fn asked(value: &impl Measured) -> Result<()> {
     value.doubt().map_or(Ok(()), |doubt| {
         Err(Fault::refused(doubt)
             .cause("metres, or another unit than millimetres")
-            .next("convert it to mm, or say --as-stated where it is right as it is"))
+            .next("convert it to mm, or confirm it with --as-stated"))
     })
 }
 
@@ -357,7 +359,8 @@ fn together(folder: &Path) -> Together<'_> {
 
 fn again(kind: Kind) -> String {
     format!(
-        "run sheetlight calibrate {} again, put {}.previous.json back, or vouch for it with sheetlight station seal --kind {} \
+        "run sheetlight calibrate {} again, put {}.previous.json back, or vouch for it with sheetlight station seal \
+         --kind {} \
          --because WHY",
         kind.command(),
         kind.name(),

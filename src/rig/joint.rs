@@ -58,7 +58,8 @@ impl JointCovariance {
             && (0..n).all(|i| self.matrix[i][i] >= 0.0)
     }
 
-    /// The first of these records, each with what it holds, that the covariance is not of; a record that is missing is none.
+    /// The first of these records, each with what it holds, that the covariance is not of; a record that is missing
+    /// is none.
     pub(super) fn other(&self, now: &[(Kind, Option<String>)]) -> Option<Kind> {
         let other =
             |(kind, content): &&(Kind, Option<String>)| content.is_none() || self.of.get(kind) != content.as_ref();

@@ -1,4 +1,5 @@
-//! In: what was calibrated. Out: its names in files and for people, its frame, and the parameters that its covariance has.
+//! In: what was calibrated. Out: its names in files and for people, its frame, and the parameters that its covariance
+//! has.
 //! Frame and unit: `A_T_b` maps coordinates in frame b to frame A; the unit is part of a parameter's name.
 
 use crate::camera::{ALWAYS_NAMED, NAMES, PARAMETERS};
@@ -107,8 +108,9 @@ impl Kind {
             Kind::ProfileHandEye => Place::FlangeFromSensor,
         }
     }
-    /// The covariance's parameters in their order, and how many of the first of them a file may have: a pointer (imported,
-    /// simulated) may be without its camera. Beyond the longest a camera's others may follow, where they were estimated.
+    /// The covariance's parameters in their order, and how many of the first of them a file may have: a pointer
+    /// (imported, simulated) may be without its camera. Beyond the longest a camera's others may follow, where they
+    /// were estimated.
     pub fn parameters(self) -> (&'static [&'static str], &'static [usize]) {
         match self {
             Kind::Camera => (&NAMES, &[ALWAYS_NAMED]),

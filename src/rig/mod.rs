@@ -12,6 +12,7 @@ mod kind;
 mod measured;
 mod once;
 mod pictures;
+mod plan;
 mod seal;
 mod volume;
 
@@ -25,5 +26,6 @@ pub use hash::hash_text;
 pub use joint::{Joint, JointCovariance};
 pub use kind::{Kind, Place, Units};
 pub use measured::Measured;
+pub use plan::{RigForecast, RigPlan};
 pub use seal::{sealed, unsealed};
 pub use volume::Volume;

@@ -1,6 +1,6 @@
 //! In: the text of a JSON file. Out: its value, where every object names each of its keys once.
-//! A key that stands twice is refused: serde_json keeps the last one and other programs the first, so that the file would say
-//! two things. Frame and unit: none.
+//! A key that stands twice is refused: serde_json keeps the last one and other programs the first, so that the file
+//! would say two things. Frame and unit: none.
 
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};

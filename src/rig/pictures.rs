@@ -25,9 +25,10 @@ impl Calibration<Intrinsics> {
         };
         let stated = readout.expect("all others are answered above");
         if stated.reversed != known.reversed {
-            return Err(self.another(size).cause("the pictures are mirrored, or those of the calibration were").next(
-                "set ReverseX and ReverseY of the camera as they were when it was calibrated, or calibrate it anew",
-            ));
+            return Err(self
+                .another(size)
+                .cause("the pictures are mirrored, or those of the calibration were")
+                .next("set ReverseX and ReverseY of the camera as at its calibration, or calibrate it again"));
         }
         let whole = known.to_whole(camera);
         let (sensor, reach) = (known.sensor_px.or(stated.sensor_px), stated.reach(size));
@@ -82,7 +83,7 @@ impl Calibration<Intrinsics> {
         let ([width, height], readout) = (self.size(), self.readout.map_or(String::new(), |r| format!(" ({r})")));
         Fault::input(format!("pictures are {w}x{h}, the camera was calibrated at {width}x{height}{readout}"))
             .cause("another camera, or another region, binning or decimation set in it")
-            .next("set the camera as it was when it was calibrated, or calibrate it with pictures of the same kind")
+            .next("set the camera as at its calibration, or calibrate it with pictures of the same kind")
     }
 }
 

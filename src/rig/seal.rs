@@ -1,5 +1,5 @@
-//! In: a record that the program writes and must find unchanged. Out: its JSON with a SHA-256 of all the rest in `seal`, and
-//! the record back from it. A seal tells of edits and damage; it is no signature.
+//! In: a record that the program writes and must find unchanged. Out: its JSON with a SHA-256 of all the rest in
+//! `seal`, and the record back from it. A seal tells of edits and damage; it is no signature.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
@@ -20,7 +20,7 @@ fn seal_of(value: &Value) -> String {
 }
 
 /// For files of which the caller says no more.
-const AGAIN: &str = "make it again, or put the former one back";
+const AGAIN: &str = "make it again, or restore the previous one";
 
 /// The record of a file whose seal is whole. `what` says what the file should be.
 pub fn unsealed<T: DeserializeOwned>(text: &str, what: &str) -> Result<T> {
@@ -33,9 +33,9 @@ pub fn unsealed<T: DeserializeOwned>(text: &str, what: &str) -> Result<T> {
     let is = seal_of(&value);
     if seal != is {
         return Err(Fault::input(format!(
-            "{what}: was changed after it was made: sealed as {seal:.12}, it holds {is:.12}"
+            "{what}: was changed after it was made: the seal is {seal:.12}, the content gives {is:.12}"
         ))
-        .cause("edited by hand, put together from two files, or damaged")
+        .cause("edited by hand, merged from two files, or damaged")
         .next(AGAIN));
     }
     shaped(value, what)
@@ -45,7 +45,7 @@ pub fn unsealed<T: DeserializeOwned>(text: &str, what: &str) -> Result<T> {
 pub(super) fn apart(text: &str, what: &str) -> Result<(Value, Option<String>)> {
     let mut value = super::once::parse(text).map_err(|e| strange(what, &e))?;
     let Some(object) = value.as_object_mut() else {
-        return Err(Fault::input(format!("{what}: is no JSON object")).cause("another kind of file").next(AGAIN));
+        return Err(Fault::input(format!("{what}: is not a JSON object")).cause("another kind of file").next(AGAIN));
     };
     let seal = object.remove("seal").map(|s| s.as_str().unwrap_or_default().to_owned());
     Ok((value, seal))

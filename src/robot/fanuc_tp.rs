@@ -68,7 +68,7 @@ fn bad(what: String) -> Fault {
 /// One position: what stands in its brackets and in its braces.
 fn position<To: Frame, From: Frame>(head: &str, body: &str) -> Result<TpPosition<To, From>> {
     let (number, comment) = head.split_once(':').unwrap_or((head, ""));
-    let number: u32 = number.trim().parse().map_err(|_| bad(format!("P[{number}]: is no position number")))?;
+    let number: u32 = number.trim().parse().map_err(|_| bad(format!("P[{number}]: is not a position number")))?;
     // Further motion groups (a positioner) follow the robot's.
     let group = body.find("GP2").map_or(body, |g| &body[..g]);
     if body.contains('*') {
@@ -106,7 +106,7 @@ fn numbers(number: u32, group: &str) -> Result<Vec<f64>> {
             let digits = value
                 .strip_suffix(unit)
                 .ok_or_else(|| bad(format!("P[{number}]: {key} = {value} is not in {unit}")))?;
-            digits.trim().parse::<f64>().map_err(|_| bad(format!("P[{number}]: {key} = {value} is no number")))
+            digits.trim().parse::<f64>().map_err(|_| bad(format!("P[{number}]: {key} = {value} is not a number")))
         })
         .collect()
 }
@@ -116,7 +116,12 @@ mod tests {
     use super::*;
     use crate::geometry::{Base, Flange};
 
-    const LISTING: &str = "/PROG  BALL\n/MN\n   1:J P[1] 100% FINE    ;\n   2:  !X = 3 ;\n/POS\nP[1]{\n   GP1:\n\tUF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX =   500.125  mm,\tY =   -20.500  mm,\tZ =   300.000  mm,\n\tW =   180.000 deg,\tP =    10.000 deg,\tR =   -90.000 deg\n};\nP[2:\"over the ball\"]{\n   GP1:\n\tUF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX =  1.0  mm,\tY =  2.0  mm,\tZ =  3.0  mm,\n\tW =  0.0 deg,\tP =  0.0 deg,\tR =  90.0 deg\n};\n/END\n";
+    const LISTING: &str = "/PROG  BALL\n/MN\n   1:J P[1] 100% FINE    ;\n   2:  !X = 3 ;\n/POS\nP[1]{\n   GP1:\n\tUF \
+                           : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX =   500.125  mm,\tY =   -20.500  mm,\tZ \
+                           =   300.000  mm,\n\tW =   180.000 deg,\tP =    10.000 deg,\tR =   -90.000 \
+                           deg\n};\nP[2:\"over the ball\"]{\n   GP1:\n\tUF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, \
+                           0',\n\tX =  1.0  mm,\tY =  2.0  mm,\tZ =  3.0  mm,\n\tW =  0.0 deg,\tP =  0.0 deg,\tR =  \
+                           90.0 deg\n};\n/END\n";
 
     #[test]
     fn positions_are_read_with_comment_and_frames() {

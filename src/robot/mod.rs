@@ -94,8 +94,8 @@ impl Convention {
         }
     }
 
-    /// Denso writes a figure behind a pose: which way round shoulder, elbow and wrist are. A pose without its joints does not need
-    /// it; what stands there must be one, though, or the numbers are in another order.
+    /// Denso writes a figure behind a pose: which way round shoulder, elbow and wrist are. A pose without its joints
+    /// does not need it; what stands there must be one, though, or the numbers are in another order.
     fn without_figure(self, numbers: &[f64]) -> Result<&[f64]> {
         let (pose, figure) = match (self, numbers.split_last()) {
             (Convention::Denso, Some((figure, pose))) if pose.len() == 6 => (pose, *figure),
@@ -126,7 +126,7 @@ impl Convention {
             // No wrist turns more often, whatever it counts.
             let (limit, unit) = if degrees { (3600.0, "degrees") } else { (63.0, "radians") };
             if let Some(angle) = numbers[place].iter().find(|a| a.abs() > limit) {
-                return Err(Fault::input(format!("an angle of {angle:?} {unit}, at most {limit} are believed"))
+                return Err(Fault::input(format!("an angle of {angle:?} {unit}, at most {limit} are accepted"))
                     .cause("a spoilt file, or numbers in another order or unit")
                     .next("export the pose again"));
             }

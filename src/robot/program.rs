@@ -1,5 +1,5 @@
-//! In: the poses of an insertion. Out: the text of a program for a robot's own controller: approach, insertion, retract along
-//! straight lines.
+//! In: the poses of an insertion. Out: the text of a program for a robot's own controller: approach, insertion,
+//! retract along straight lines.
 //! Frame and unit: the tool in the robot's base frame, mm; each language's own units in the text; speed mm/s.
 
 use super::Convention;
@@ -80,7 +80,8 @@ fn pacscript(name: &str, poses: &Named, speed: f64) -> String {
     // Straight motions of an RC8 are stated in per cent; what 100 % is depends on the arm.
     let mut out = head("'");
     out += &format!(
-        "' Set the external speed so that a straight motion goes at {speed:.0} mm/s.\n' {name}\nSub Main\n  TakeArm Keep = 1\n"
+        "' Set the external speed so that a straight motion goes at {speed:.0} mm/s.\n' {name}\nSub Main\n  TakeArm \
+         Keep = 1\n"
     );
     for (what, pose) in poses {
         out += &format!("  Move L, @E P({}, -1) ' {what}\n", list(Convention::Denso, pose, 4).join(", "));
@@ -139,7 +140,8 @@ fn tp(name: &str, poses: &Named, speed: f64) -> String {
     for (k, (what, pose)) in poses.iter().enumerate() {
         let n = list(Convention::Fanuc, pose, 4);
         out += &format!(
-            "P[{}:\"{what}\"]{{\n   GP1:\n\tUF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX = {} mm,\tY = {} mm,\tZ = {} mm,\n\tW = {} deg,\tP = {} deg,\tR = {} deg\n}};\n",
+            "P[{}:\"{what}\"]{{\n   GP1:\n\tUF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX = {} mm,\tY = {} \
+             mm,\tZ = {} mm,\n\tW = {} deg,\tP = {} deg,\tR = {} deg\n}};\n",
             k + 1,
             n[0],
             n[1],
@@ -163,7 +165,8 @@ fn rapid(name: &str, poses: &Named, speed: f64) -> String {
         );
     }
     out += &format!(
-        "  CONST speeddata slow := [{speed:.0},30,30,30];\n  ! The tool that inserts:\n  PERS tooldata inserting;\n  PROC main()\n"
+        "  CONST speeddata slow := [{speed:.0},30,30,30];\n  ! The tool that inserts:\n  PERS tooldata inserting;\n  \
+         PROC main()\n"
     );
     for (what, _) in poses {
         out += &format!("    MoveL {what}, slow, fine, inserting \\WObj:=wobj0;\n");

@@ -1,15 +1,15 @@
-//! In: one picture with the laser off. Out: shots without that light, and a refusal where it cannot have been taken as the
-//! shots were. Frame and unit: grey levels of the shots' depth. The rule is that of the stage `ambient`.
+//! In: one picture with the laser off. Out: shots without that light, and a refusal where it cannot have been taken
+//! as the shots were. Frame and unit: grey levels of the shots' depth. The rule is that of the stage `ambient`.
 
 use super::Format;
 use crate::fault::{Fault, Result};
 use crate::raster::{Image, Pixels};
 
-/// Grey levels (8 bits) by which a pixel of the ambient picture may exceed that of a shot: noise, and a robot that moved
-/// on under a leak of room light.
+/// Grey levels (8 bits) by which a pixel of the ambient picture may exceed that of a shot: noise, and a robot that
+/// moved on under a leak of room light.
 const SPARE: u32 = 8;
-/// Share of a shot's pixels that may be darker than that. With one exposure hardly any is; of a picture exposed for room
-/// light, which would eat the stripe, most are.
+/// Share of a shot's pixels that may be darker than that. With one exposure hardly any is; of a picture exposed for
+/// room light, which would eat the stripe, most are.
 const DARKER: f64 = 0.1;
 
 /// Light that is in every shot.
@@ -43,7 +43,8 @@ impl Ambient {
         let share = darker as f64 / shot.pixel_count().max(1) as f64;
         if share > DARKER {
             return Err(Fault::input(format!(
-                "the ambient picture is brighter than {name} by more than {spare} grey levels in {:.0} % of its pixels, \
+                "the ambient picture is brighter than {name} by more than {spare} grey levels in {:.0} % of its \
+                 pixels, \
                  limit {:.0} %",
                 100.0 * share,
                 100.0 * DARKER

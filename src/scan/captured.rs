@@ -1,4 +1,5 @@
-//! In: a running camera's pictures, paired with what moves; straight, or as a recorder hands them on. Out: a source of shots.
+//! In: a running camera's pictures, paired with what moves; straight, or as a recorder hands them on. Out: a source
+//! of shots.
 //! Frame and unit: as [`super::Shot`].
 
 use super::source::{BadShot, Shot, Source};
@@ -31,8 +32,8 @@ impl StreamSource {
 }
 
 fn without_stand(index: u32, name: &str) -> BadShot {
-    let fault = Fault::usage("a picture comes without where things stood")
-        .cause("nothing is said to move")
+    let fault = Fault::usage("a picture has no pose")
+        .cause("no motion is stated")
         .next("say how pictures are paired with what moves: --pair count, step or clock, or given");
     BadShot { index, name: name.into(), fault, last: true }
 }
@@ -86,11 +87,12 @@ impl Source for StreamSource {
     fn remarks(&self) -> Vec<String> {
         let left = self.stream.left_out();
         let Some(first) = left.first() else { return Vec::new() };
-        vec![format!("{} pictures left out, the first ({}): {}", self.stream.account().unpaired, first.id, first.why)]
+        vec![format!("{} pictures excluded, the first ({}): {}", self.stream.account().unpaired, first.id, first.why)]
     }
 }
 
-/// What a recorder on another thread hands on, scanned while it goes on recording. Shots that have to wait are read from its disk again.
+/// What a recorder on another thread hands on, scanned while it goes on recording. Shots that have to wait are read
+/// from its disk again.
 pub struct RecordedSource {
     format: Format,
     recording: Recording,
@@ -182,7 +184,7 @@ impl Source for RecordedSource {
             Some(Err(fault)) => vec![fault.what.clone()],
             Some(Ok(r)) if !r.left_out.is_empty() => {
                 vec![format!(
-                    "{} pictures left out, the first ({}): {}",
+                    "{} pictures excluded, the first ({}): {}",
                     r.left_out.len(),
                     r.left_out[0].id,
                     r.left_out[0].why

@@ -1,5 +1,5 @@
-//! In: a rig, what moves the part past the light, and where that stood at a shot. Out: how the camera stood to the part, and how
-//! far that is uncertain.
+//! In: a rig, what moves the part past the light, and where that stood at a shot. Out: how the camera stood to the
+//! part, and how far that is uncertain.
 //! Frame and unit: the cloud's frame ([`Motion::frame`]: base, flange of a robot that carries the part, axis); mm, rad.
 
 use crate::fault::{Fault, Result};
@@ -13,8 +13,9 @@ use nalgebra::{DMatrix, Matrix3, Matrix6};
 pub struct Place {
     /// Camera frame to the cloud's frame, for which `Base` stands whatever moved; mm.
     pub from_camera: Rigid<Base, Camera>,
-    /// Of a motion (v, w) of the cloud's points, mm and rad: the axis', and speed times what is not known of the time. `None`: the
-    /// robot's share and the hand-eye's are in the budget of what is found, where all points of a part share them.
+    /// Of a motion (v, w) of the cloud's points, mm and rad: the axis', and speed times what is not known of the
+    /// time. `None`: the robot's share and the hand-eye's are in the budget of what is found, where all points of a
+    /// part share them.
     pub covariance: Option<Matrix6<f64>>,
 }
 
@@ -65,8 +66,8 @@ pub fn parts_for(rig: &Rig, motion: &Motion) -> Rig {
 }
 
 impl Carrier {
-    /// Refused: a rig that lacks what the motion needs (hand-eye, base camera or axis), counts of another unit than the axis
-    /// was calibrated in.
+    /// Refused: a rig that lacks what the motion needs (hand-eye, base camera or axis), counts of another unit than
+    /// the axis was calibrated in.
     pub fn new(rig: &Rig, motion: &Motion) -> Result<Carrier> {
         let way = match (motion.axis(), motion.carries) {
             (None, Carries::Sensor) => Way::Sensor(rig.need_hand_eye()?.value),
@@ -96,8 +97,8 @@ impl Carrier {
         matches!(&self.way, Way::Axis(on) if on.axis.kind == AxisKind::Turntable)
     }
 
-    /// `slip`: how far the stand may be off; `anchor`: where the light meets the part, camera frame, mm; an axis' turns from stop to
-    /// stop are about it.
+    /// `slip`: how far the stand may be off; `anchor`: where the light meets the part, camera frame, mm; an axis'
+    /// turns from stop to stop are about it.
     pub fn place(&self, stand: &Stand, slip: Option<&Slip>, anchor: &Vec3) -> Result<Place> {
         let mut place = self.stood(stand, anchor)?;
         if let Some(Twist { v, w }) = slip.and_then(|s| self.moved(stand, s)) {
@@ -143,9 +144,9 @@ impl Carrier {
                 Ok(Place { from_camera, covariance: None })
             }
             (Way::Axis(on), Stand::Count(count)) => on.place(*count, anchor),
-            _ => Err(Fault::input("a shot tells where something else stood than what moves")
+            _ => Err(Fault::input("a shot has the pose of something else than what moves")
                 .cause("the recording's motion and its shots do not belong together")
-                .next("state the motion of meta.json as it was")),
+                .next("restore the motion of meta.json")),
         }
     }
 }
@@ -155,7 +156,7 @@ impl OnAxis {
         let far = (self.axis.pitch * count).abs();
         if self.axis.kind == AxisKind::Linear && far > FARTHEST {
             return Err(Fault::input(format!(
-                "the axis stands {far:.0} mm from its zero, at most {FARTHEST:.0} is believed"
+                "the axis stands {far:.0} mm from its zero, at most {FARTHEST:.0} is accepted"
             ))
             .cause("an encoder that counts on for days")
             .next("state a \"zero\" in meta.json's motion that lies near the part's counts"));

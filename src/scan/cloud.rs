@@ -1,6 +1,7 @@
 //! In: points as they leave the scanner, shot by shot. Out: a binary PLY that grows on disk, can be
 //! resumed after a crash, and gets its final name only when it is complete; and the way back.
-//! Frame and unit: the frame that the header names, mostly the robot's base, mm; (u, v) in pixels of the shot; byte layout in docs/file-formats.md.
+//! Frame and unit: the frame that the header names, mostly the robot's base, mm; (u, v) in pixels of the shot; byte
+//! layout in docs/file-formats.md.
 
 use crate::fault::{Fault, Result};
 use crate::files::{moment, remove};
@@ -136,8 +137,8 @@ impl CloudWriter {
         // A count that no file holds is a length that none has.
         let wanted = keep.saturating_mul(RECORD).saturating_add(start);
         if head.is_none() || length < wanted {
-            return Err(Fault::input(format!("{}: holds {length} bytes, {wanted} needed to resume", part.display()))
-                .cause("another program's file, or the disk lost what was written")
+            return Err(Fault::input(format!("{}: has {length} bytes, {wanted} needed to resume", part.display()))
+                .cause("another program's file, or the disk lost written data")
                 .next("start the scan again without resuming"));
         }
         file.set_len(wanted).and_then(|()| file.seek(SeekFrom::End(0))).map_err(|e| Fault::write(&part, e))?;

@@ -67,8 +67,8 @@ impl StripeSeen {
     }
 }
 
-/// A piece of the stripe that tells its width is at least this share of what crosses the picture: beside a part a scan sees
-/// splinters of light at its edges.
+/// A piece of the stripe that tells its width is at least this share of what crosses the picture: beside a part a
+/// scan sees splinters of light at its edges.
 const LONG_PIECE: f32 = 0.1;
 
 /// What does the work, built when the stripe is known, because its sizes follow from the stripe.
@@ -101,7 +101,8 @@ pub struct Engine {
     cut: u64,
 }
 
-/// Shots that the processor works on together, at least: as many as it has threads, and enough for their ends to overlap.
+/// Shots that the processor works on together, at least: as many as it has threads, and enough for their ends to
+/// overlap.
 const HOST_BATCH: usize = 4;
 /// Of pictures above this size three are enough to measure the stripe: each has thousands of peaks.
 const LARGE_PIXELS: u32 = 2_000_000;
@@ -168,8 +169,9 @@ impl Engine {
         self.device.as_ref()
     }
 
-    /// Noise, width and speckle of the stripe, the median over some pictures; `None` where none shows enough of it. Pictures that show
-    /// a long piece count alone where there are any: light that falls over an edge is narrower than the stripe.
+    /// Noise, width and speckle of the stripe, the median over some pictures; `None` where none shows enough of it.
+    /// Pictures that show a long piece count alone where there are any: light that falls over an edge is narrower
+    /// than the stripe.
     pub fn measure(&self, images: &[&Image]) -> Option<StripeSeen> {
         let few = self.format.width * self.format.height > LARGE_PIXELS && images.len() > 3;
         let step = if few { images.len() / 3 } else { 1 };
@@ -210,8 +212,8 @@ impl Engine {
         (right - left) as f32 * y.abs() + (bottom - top) as f32 * x.abs()
     }
 
-    /// Takes over a stripe: the sizes of the fit, the least window of the threshold, limits above the noise; builds the GPU's
-    /// chain or the processor's. What is under way is collected before.
+    /// Takes over a stripe: the sizes of the fit, the least window of the threshold, limits above the noise; builds
+    /// the GPU's chain or the processor's. What is under way is collected before.
     pub fn set_stripe(&mut self, stripe: &Stripe) -> Result<()> {
         self.width_px = stripe.width_px;
         self.extraction = self.asked.clone().for_stripe(stripe);
@@ -322,8 +324,9 @@ impl Engine {
 
 /// Pixels of a block whose corners are looked at first.
 const BLOCK: (u32, u32) = (32, 16);
-/// How far the corners' depths must be from a limit for the whole block to be on their side of it, a share of the limit.
-/// One over depth is linear over the picture but for the lens, which bends it by far less than this within a block.
+/// How far the corners' depths must be from a limit for the whole block to be on their side of it, a share of the
+/// limit. One over depth is linear over the picture but for the lens, which bends it by far less than this within a
+/// block.
 const CLEAR: f64 = 1e-3;
 
 /// Pixels that are looked at: where the laser plane lies within the believed depths, in the region that a person chose.
@@ -376,7 +379,8 @@ mod tests {
 
     #[test]
     fn the_region_is_the_same_block_by_block_and_pixel_by_pixel() {
-        // A common lens and a strong one, a sheet across the picture and one along a diagonal; a size of no whole blocks.
+        // A common lens and a strong one, a sheet across the picture and one along a diagonal; a size of no whole
+        // blocks.
         for (k, normal) in [(-0.118, [-0.019, 0.883, 0.469]), (-0.31, [0.55, 0.6, 0.58])] {
             let camera = Intrinsics {
                 fx: 611.6,

@@ -42,27 +42,32 @@ impl Rule {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Extraction {
-    /// Measure the stripe's width and speckle and the noise of dark pixels in the first shots and take the window of the
-    /// threshold and the sizes of the fit from them, and raise the limits of light above the noise. Off: the numbers below are
-    /// used as they stand.
+    /// Measure the stripe's width and speckle and the noise of dark pixels in the first shots and take the window of
+    /// the threshold and the sizes of the fit from them, and raise the limits of light above the noise. Off: the
+    /// numbers below are used as they stand.
     pub measure_stripe: bool,
-    /// Take out of the cloud what the reported places scatter by about a smooth path, as far as the surface shows that the camera did not move
-    /// so: lines of a scan that stand higher or lower than their neighbours. Off: every shot lies where it was reported.
+    /// Take out of the cloud what the reported places scatter by about a smooth path, as far as the surface shows
+    /// that the camera did not move so: lines of a scan that stand higher or lower than their neighbours. Off: every
+    /// shot lies where it was reported.
     pub straighten: bool,
-    /// Take out of the cloud by how much the light's middle lies off the sheet's where the surface's brightness changes from shot to shot, as
-    /// far as the cloud shows that it does. Off: every point lies where the light's middle was.
+    /// Take out of the cloud by how much the light's middle lies off the sheet's where the surface's brightness
+    /// changes from shot to shot, as far as the cloud shows that it does. Off: every point lies where the light's
+    /// middle was.
     pub thick_sheet: bool,
-    /// Where in the picture the stripe is looked for: left, top, right and bottom as shares of its width and height, 0..=1. A tool that
-    /// stands in the picture, or a place that always shines, is left out so; places in the picture stay what they are.
+    /// Where in the picture the stripe is looked for: left, top, right and bottom as shares of its width and height,
+    /// 0..=1. A tool that stands in the picture, or a place that always shines, is left out so; places in the picture
+    /// stay what they are.
     pub region: [f64; 4],
     /// Offset and minimum in grey levels of an 8-bit picture; deeper ones scale them.
     pub threshold: ThresholdParams,
-    /// The thinning's rule; `auto` takes the one for the direction in which the rig sees its stripe ([`Thinning::across`]).
+    /// The thinning's rule; `auto` takes the one for the direction in which the rig sees its stripe
+    /// ([`Thinning::across`]).
     pub thinning: Rule,
     /// How far the ends of lines are carried on.
     pub lengthen: LengthenParams,
-    /// Least distance of two fits that the skeleton asks for across the stripe, in stripe widths (sigma), 0..=6; 0 fits every
-    /// pixel of the skeleton. Matters where the stripe is wider than 2 px: its pixels across the stripe find the same centre.
+    /// Least distance of two fits that the skeleton asks for across the stripe, in stripe widths (sigma), 0..=6; 0
+    /// fits every pixel of the skeleton. Matters where the stripe is wider than 2 px: its pixels across the stripe
+    /// find the same centre.
     pub spacing: f32,
     /// Lit pixels need others near them ([`spacing::COMPANY`]). No setting: it follows from the noise.
     #[serde(skip)]
@@ -103,14 +108,16 @@ const LEAST_REGION: f64 = 0.02;
 /// Least window of the threshold in stripe sigmas: the stripe fills a sixth of it, so the mean stays that
 /// of the surroundings and the flanks stay lit.
 const WINDOW_WIDTHS: f32 = 24.0;
-/// Standard deviations of a dark pixel by which light exceeds it: one pixel in 740 of pure noise does, and such specks have
-/// no company ([`spacing::COMPANY`]). With a fourth a stripe four times as bright as the noise loses half of its points.
+/// Standard deviations of a dark pixel by which light exceeds it: one pixel in 740 of pure noise does, and such
+/// specks have no company ([`spacing::COMPANY`]). With a fourth a stripe four times as bright as the noise loses half
+/// of its points.
 const ABOVE_NOISE: f32 = 3.0;
 /// Of light that stands so many above it, one dark pixel in 30,000 is taken for it: no company is asked for.
 const FREE_OF_SPECKS: f32 = 4.0;
 
 impl Extraction {
-    /// The same for pictures whose dark pixels scatter by `noise` grey levels of an 8-bit picture: no limit of light lies within it.
+    /// The same for pictures whose dark pixels scatter by `noise` grey levels of an 8-bit picture: no limit of light
+    /// lies within it.
     pub fn in_noise(mut self, noise: f32) -> Extraction {
         let least = (ABOVE_NOISE * noise).round().min(255.0);
         self.threshold.offset = self.threshold.offset.max(least as i32);
@@ -123,7 +130,8 @@ impl Extraction {
         self
     }
 
-    /// The same for pictures with such a stripe: the sizes of the fit, the least window of the threshold, limits above the noise.
+    /// The same for pictures with such a stripe: the sizes of the fit, the least window of the threshold, limits
+    /// above the noise.
     pub fn for_stripe(self, stripe: &Stripe) -> Extraction {
         let mut e = self.in_noise(stripe.noise);
         let window = (WINDOW_WIDTHS * stripe.width_px) as u32 | 1;
@@ -132,14 +140,16 @@ impl Extraction {
         e
     }
 
-    /// The region's pixels, those whose middle lies in it: first and last column and row behind the last, at this size of pictures.
+    /// The region's pixels, those whose middle lies in it: first and last column and row behind the last, at this
+    /// size of pictures.
     pub fn region_px(&self, format: Format) -> [u32; 4] {
         let edge = |share: f64, size: u32| (share * f64::from(size) - 0.5).ceil().clamp(0.0, f64::from(size)) as u32;
         let ([left, top, right, bottom], (w, h)) = (self.region, (format.width, format.height));
         [edge(left, w), edge(top, h), edge(right, w), edge(bottom, h)]
     }
 
-    /// What a chain is built for: `scan`, `bench` and the peers run the same. Ends of lines are carried on by widths of `width_px`.
+    /// What a chain is built for: `scan`, `bench` and the peers run the same. Ends of lines are carried on by widths
+    /// of `width_px`.
     pub fn chain(&self, format: Format, optics: Optics, width_px: f32) -> ChainConfig {
         let shift = format.bits - 8;
         let ThresholdParams { offset, minimum, .. } = self.threshold;
@@ -166,7 +176,8 @@ impl Extraction {
         let lies = |low: f64, high: f64| low >= 0.0 && high <= 1.0 && high - low >= LEAST_REGION;
         if !lies(left, right) || !lies(top, bottom) {
             return Err(Fault::usage(format!(
-                "the region is {left}, {top} to {right}, {bottom}; left and top come before right and bottom, all of them in 0..=1, \
+                "the region is {left}, {top} to {right}, {bottom}; left and top come before right and bottom, all of \
+                 them in 0..=1, \
                  {LEAST_REGION} apart at least"
             ))
             .next("correct region of [extraction] in station.toml; [0, 0, 1, 1] is the whole picture"));

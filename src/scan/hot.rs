@@ -1,17 +1,17 @@
-//! In: a scan's first pictures. Out: pixels that shine by themselves, and pictures in which their neighbours along the stripe stand for
-//! them. Frame and unit: px; grey levels of the pictures' depth.
+//! In: a scan's first pictures. Out: pixels that shine by themselves, and pictures in which their neighbours along
+//! the stripe stand for them. Frame and unit: px; grey levels of the pictures' depth.
 
 use super::Along;
 use crate::raster::{Image, Pixels};
 
-/// Pixels that shine in every picture and whose neighbours do not. On the flank of a wide stripe one moves the centre of two dozen
-/// lines by a tenth of a pixel, in every shot of a flat surface. In rows from the top, each from the left.
+/// Pixels that shine in every picture and whose neighbours do not. On the flank of a wide stripe one moves the centre
+/// of two dozen lines by a tenth of a pixel, in every shot of a flat surface. In rows from the top, each from the left.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(transparent)]
 pub struct HotPixels(Vec<[u32; 2]>);
 
-/// Pictures that tell a hot pixel from a glint, at least, and the share of them, in quarters, in which it must stand out: a stripe
-/// may lie on it in the others.
+/// Pictures that tell a hot pixel from a glint, at least, and the share of them, in quarters, in which it must stand
+/// out: a stripe may lie on it in the others.
 const PICTURES: usize = 3;
 const QUARTERS: usize = 3;
 /// What stands out, over what is beside it: standard deviations of a dark pixel, share of full scale.
@@ -21,8 +21,8 @@ const SHARE: f32 = 0.02;
 const MOST: usize = 10_000;
 
 impl HotPixels {
-    /// Those of pictures whose dark pixels scatter by `noise` grey levels of an 8-bit picture. Empty for fewer than three pictures:
-    /// in one alone a speck of light on the part looks the same.
+    /// Those of pictures whose dark pixels scatter by `noise` grey levels of an 8-bit picture. Empty for fewer than
+    /// three pictures: in one alone a speck of light on the part looks the same.
     pub fn find(pictures: &[&Image], noise: f32) -> HotPixels {
         let Some((first, others)) = pictures.split_first() else { return HotPixels::default() };
         if pictures.len() < PICTURES {
@@ -46,8 +46,8 @@ impl HotPixels {
         self.0.len()
     }
 
-    /// Puts the mean of the two neighbours along the stripe in their places; of one that is hot itself the other one's. Pixels beyond
-    /// the picture are passed over.
+    /// Puts the mean of the two neighbours along the stripe in their places; of one that is hot itself the other
+    /// one's. Pixels beyond the picture are passed over.
     pub fn fill(&self, image: &mut Image, along: Along) {
         let (w, h) = (image.width, image.height);
         for &[x, y] in &self.0 {
@@ -91,8 +91,8 @@ fn standing_out(image: &Image, over: u32) -> Vec<[u32; 2]> {
     out
 }
 
-/// Brighter by so much than all its neighbours but one (hot pixels come in pairs), and more than twice as bright over the darkest as
-/// they are: a grain of speckle has others beside it.
+/// Brighter by so much than all its neighbours but one (hot pixels come in pairs), and more than twice as bright over
+/// the darkest as they are: a grain of speckle has others beside it.
 fn stands_out(image: &Image, [x, y]: [u32; 2], over: u32) -> bool {
     let here = u32::from(image.get(x, y));
     let (mut dark, mut first, mut second) = (u32::MAX, 0, 0);

@@ -15,8 +15,8 @@ pub struct Live {
 }
 
 impl Live {
-    /// Refused: a rig without camera or laser plane; pictures that the camera's calibration does not cover; no GPU where
-    /// one is asked for.
+    /// Refused: a rig without camera or laser plane; pictures that the camera's calibration does not cover; no GPU
+    /// where one is asked for.
     pub fn new(
         rig: &Rig,
         pictures: impl Into<Pictures>,

@@ -1,5 +1,6 @@
 //! In: shots with poses and a calibrated rig. Out: point clouds, height maps and the files that hold them.
-//! Frame and unit: clouds in the frame of what is measured ([`crate::recording::Motion::frame`], mostly the robot's base), height maps in a grid frame of their own; mm.
+//! Frame and unit: clouds in the frame of what is measured ([`crate::recording::Motion::frame`], mostly the robot's
+//! base), height maps in a grid frame of their own; mm.
 
 mod ambient;
 mod captured;

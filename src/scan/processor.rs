@@ -1,4 +1,5 @@
-//! In: where the stages shall run, the adapters of this machine. Out: the GPU, opened, or this machine's own processor, and why.
+//! In: where the stages shall run, the adapters of this machine. Out: the GPU, opened, or this machine's own
+//! processor, and why.
 //! Frame and unit: none.
 
 use crate::fault::Result;
@@ -78,8 +79,8 @@ impl Where {
     }
 }
 
-/// Why the best of these adapters is passed over, if it is: a software adapter was slower at every size (`sheetlight doctor`
-/// times both).
+/// Why the best of these adapters is passed over, if it is: a software adapter was slower at every size
+/// (`sheetlight doctor` times both).
 fn without_gpu(adapters: &[AdapterInfo], named: bool) -> Option<Why> {
     match adapters.first() {
         _ if named => None,

@@ -1,6 +1,7 @@
 //! In: shots in order, a calibrated rig, settings. Out: their profiles in order: peaks with their fate,
 //! points with their standard deviation.
-//! Frame and unit: points in the carrier's frame (mostly the robot's base), mm (docs/math.md, Stripe peak; the paper's eq. 5 and 6).
+//! Frame and unit: points in the carrier's frame (mostly the robot's base), mm (docs/math.md, Stripe peak; the
+//! paper's eq. 5 and 6).
 
 use super::engine::{Engine, Measured, Optical, StripeSeen};
 use super::{Along, Ambient, Carrier, CloudPoint, Extraction, HotPixels, Pictures, Place, Processor, Shot};
@@ -31,8 +32,8 @@ pub struct Profile {
 
 /// Shots looked at for the stripe's width before the first profile leaves.
 const MEASURED_SHOTS: usize = 8;
-/// A scan that begins beside the part waits for its stripe: at most so many shots, and so many bytes of pictures where those are
-/// more than [`MEASURED_SHOTS`] shots. Dark ones before are measured with the width that was assumed.
+/// A scan that begins beside the part waits for its stripe: at most so many shots, and so many bytes of pictures
+/// where those are more than [`MEASURED_SHOTS`] shots. Dark ones before are measured with the width that was assumed.
 const HELD_SHOTS: usize = 64;
 const HELD_BYTES: usize = 256 << 20;
 /// Places of the picture, each way, at which is looked for where the sheet is seen.
@@ -100,7 +101,8 @@ impl Scanner {
         })
     }
 
-    /// Goes on with a scan of which an earlier part measured the stripe and began there: what follows from it stays what it was.
+    /// Goes on with a scan of which an earlier part measured the stripe and began there: what follows from it stays
+    /// what it was.
     pub fn resumed(mut self, stripe: Option<Stripe>, hot: HotPixels, first: Option<Rigid<Base, Camera>>) -> Scanner {
         (self.stripe, self.hot, self.first) = (stripe, hot, first);
         self

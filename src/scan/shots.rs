@@ -1,5 +1,5 @@
-//! In: where the camera stood at each shot of a scan. Out: `shots.jsonl`, which grows with the scan, and what a later step asks it:
-//! the camera at a shot, the image axis that the stripe runs along.
+//! In: where the camera stood at each shot of a scan. Out: `shots.jsonl`, which grows with the scan, and what a later
+//! step asks it: the camera at a shot, the image axis that the stripe runs along.
 //! Frame and unit: the cloud's frame, mm (docs/file-formats.md).
 
 use super::CloudPoint;
@@ -68,8 +68,8 @@ impl Shots {
         Shots { places, ..self.clone() }
     }
 
-    /// Puts points where the rays of their light's middle meet the sheet, from where [`super::Thick`] has them: edges of parts are where the
-    /// sheet's middle crosses them. Without a sheet they stay.
+    /// Puts points where the rays of their light's middle meet the sheet, from where [`super::Thick`] has them: edges
+    /// of parts are where the sheet's middle crosses them. Without a sheet they stay.
     pub fn onto_sheet(&self, points: &mut [CloudPoint]) {
         let Some(sheet) = &self.sheet else { return };
         for p in points {
@@ -151,7 +151,7 @@ impl Shots {
 
 fn missing(folder: &Path) -> Fault {
     Fault::input(format!("{}: is not there", folder.join(SHOTS_FILE).display()))
-        .cause("scanned by a former version, which did not keep where the camera stood")
+        .cause("scanned by an earlier version, which did not store the camera's poses")
         .next("scan again, without --resume: the pictures are still there")
 }
 

@@ -1,6 +1,7 @@
 //! In: a recording folder, or raw frames on a pipe with a pose file. Out: shots in order, decoded
 //! ahead on other threads, a bounded number of them in memory.
-//! Frame and unit: robot poses are base_from_flange, mm, an axis stands at counts; pictures in grey levels of the sensor's depth.
+//! Frame and unit: robot poses are base_from_flange, mm, an axis stands at counts; pictures in grey levels of the
+//! sensor's depth.
 
 use crate::camera::Readout;
 use crate::capture::{Account, Format, Latency, Pictures, RawFormat, RawFrames};
@@ -69,8 +70,8 @@ pub trait Source {
     }
 }
 
-/// Memory for shots that are decoded ahead: at 640x480 two batches of the GPU's chain, eight shots at 12 MP and 8 bits. Half as
-/// much again holds those that are being decoded.
+/// Memory for shots that are decoded ahead: at 640x480 two batches of the GPU's chain, eight shots at 12 MP and 8
+/// bits. Half as much again holds those that are being decoded.
 const AHEAD_BYTES: usize = 100 << 20;
 
 /// A recording folder as a source.
@@ -130,8 +131,8 @@ impl RecordingSource {
         RecordingSource::late(recording, poses, first, None)
     }
 
-    /// [`RecordingSource::open`] where the pictures' times are known to be late against the poses': of pictures that were paired by
-    /// clock.
+    /// [`RecordingSource::open`] where the pictures' times are known to be late against the poses': of pictures that
+    /// were paired by clock.
     pub fn late(
         recording: &Recording,
         poses: Option<&str>,
@@ -193,14 +194,15 @@ fn posed(recording: &Recording, poses: Option<&str>) -> Result<Vec<Stood>> {
                 poses.len()
             ))
             .cause("the pose file was cut short, or belongs to another recording")
-            .next("record the poses again, or leave the frames without poses out of meta.json"));
+            .next("record the poses again, or remove the frames without poses from meta.json"));
         };
         Ok((name.clone(), Ok(Stand::Robot(*base_from_flange)), slip_of(&recording.meta.frames[i])))
     };
     frames.filter_map(|(i, f)| Some((i, f.laser.as_ref()?, f.pose))).map(stand).collect()
 }
 
-/// Pictures with the laser on and the axis' counts. One whose count is not known is a bad shot: nothing is made up for it.
+/// Pictures with the laser on and the axis' counts. One whose count is not known is a bad shot: nothing is made up
+/// for it.
 fn counted(recording: &Recording) -> Result<Vec<Stood>> {
     let counts = recording.counts()?;
     let frames = recording.meta.frames.iter().zip(counts).enumerate();
@@ -208,7 +210,7 @@ fn counted(recording: &Recording) -> Result<Vec<Stood>> {
         let unknown = || {
             Fault::input(format!("frame {i} ({name}) has no count"))
                 .cause("the encoder's reading was lost")
-                .next("add its count to the recording, or leave the shot out with --skip-bad")
+                .next("add its count to the recording, or exclude the shot with --skip-bad")
         };
         (name.clone(), count.map(Stand::Count).ok_or_else(unknown), slip_of(&recording.meta.frames[i]))
     };
@@ -276,8 +278,8 @@ impl<R: Read> RawSource<R> {
             n => format!(" and {n} missing frames are named"),
         };
         Fault::input(format!("the pipe gave {frames}, the pose file has {} poses{missing}", self.poses.len()))
-            .cause("frames were lost or doubled on the way, so later ones stand at poses of others")
-            .next("record again, or name the frames that never came: --missing 17,80")
+            .cause("frames were lost or doubled, so later ones have other frames' poses")
+            .next("record again, or name the missing frames: --missing 17,80")
     }
 }
 

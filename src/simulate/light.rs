@@ -242,8 +242,10 @@ mod tests {
 
     fn plate(tilt: f64) -> Scene {
         let text = format!(
-            "name = 'plate'\nregion_mm = [-90, -60, 90, 60]\n[[part]]\nname = 'p'\nat_mm = [0, 0, 0]\ntilt_deg = [{tilt}, 4]\n\
-             [[part.solid]]\nshape = {{ block = {{ size_mm = [400, 400, 5] }} }}\nat_mm = [0, 0, 0]\nmaterial = {{ albedo = 1 }}"
+            "name = 'plate'\nregion_mm = [-90, -60, 90, 60]\n[[part]]\nname = 'p'\nat_mm = [0, 0, 0]\ntilt_deg = \
+             [{tilt}, 4]\n\
+             [[part.solid]]\nshape = {{ block = {{ size_mm = [400, 400, 5] }} }}\nat_mm = [0, 0, 0]\nmaterial = {{ \
+             albedo = 1 }}"
         );
         Scene::new(SceneSpec::parse(&text).unwrap()).unwrap()
     }
@@ -299,7 +301,8 @@ mod tests {
 
     #[test]
     fn walls_throw_shadows_for_laser_and_camera() {
-        let text = "name = 'wall'\nregion_mm = [-9, -9, 9, 9]\n[[solid]]\nshape = { block = { size_mm = [300, 300, 5] } }\nat_mm = [0, 0, 0]\n\
+        let text = "name = 'wall'\nregion_mm = [-9, -9, 9, 9]\n[[solid]]\nshape = { block = { size_mm = [300, 300, \
+                    5] } }\nat_mm = [0, 0, 0]\n\
                     [[solid]]\nshape = { block = { size_mm = [20, 4, 12] } }\nat_mm = [0, -6, 12]";
         let station = Station::design();
         let scene = Scene::new(SceneSpec::parse(text).unwrap()).unwrap();

@@ -27,7 +27,8 @@ pub fn above(x: f64, y: f64, z: f64) -> Rigid<InScene, Camera> {
 }
 
 /// A straight pass over the scene's region along y in equal steps, from the side that the laser stands on. The sheet
-/// meets the scene's focus height at the working distance; the pass is longer than the region by what the heights shift it.
+/// meets the scene's focus height at the working distance; the pass is longer than the region by what the heights
+/// shift it.
 pub fn scan(station: &Station, scene: &Scene, shots: usize) -> Vec<Rigid<InScene, Camera>> {
     let [x0, y0, x1, y1] = scene.spec.region_mm;
     let (rig, laser) = (&station.rig, &station.laser);

@@ -1,5 +1,5 @@
-//! In: a station, what moves the parts past it, a scene. Out: the true axis, the counts of a scan, where the camera stands over
-//! the scene at a count, and a board that rides along.
+//! In: a station, what moves the parts past it, a scene. Out: the true axis, the counts of a scan, where the camera
+//! stands over the scene at a count, and a board that rides along.
 //! Frame and unit: camera, axis (docs/conventions.md), scene, board; mm, counts.
 
 use super::light::InScene;
@@ -32,8 +32,8 @@ const STEPS: f64 = 40.0;
 const TURN: f64 = 36_000.0;
 
 impl Ride {
-    /// One pass of an axis over the scene's region in `shots`, or one turn about the scene's origin. Another axis for every
-    /// seed.
+    /// One pass of an axis over the scene's region in `shots`, or one turn about the scene's origin. Another axis for
+    /// every seed.
     pub fn new(kind: AxisKind, station: &Station, scene: &Scene, board: &BoardSpec, shots: usize) -> Ride {
         let mut rng = station.rng("ride", kind as u64);
         let mut within = |by: f64| if station.seed == 0 { 0.0 } else { rng.random_range(-by..=by) };
@@ -137,7 +137,8 @@ impl Ride {
     }
 }
 
-/// The board at count 0: on the table where the camera looks, on a turntable about its axis; tilted a little, as on a wedge.
+/// The board at count 0: on the table where the camera looks, on a turntable about its axis; tilted a little, as on a
+/// wedge.
 fn lying(
     station: &Station,
     board: &BoardSpec,

@@ -1,5 +1,5 @@
-//! In: a rig file (TOML): the design of a camera with a sheet of light on a robot. Out: the same, checked, and the lengths
-//! that follow from it: pixel footprint, stripe length, distances of boards.
+//! In: a rig file (TOML): the design of a camera with a sheet of light on a robot. Out: the same, checked, and the
+//! lengths that follow from it: pixel footprint, stripe length, distances of boards.
 //! Frame and unit: camera frame, mm, degrees, px; each key shows its unit, docs/file-formats.md, Rig file.
 
 use super::sensor::Sensor;

@@ -1,5 +1,5 @@
-//! In: a rig's design. Out: a scene that fills its field: a stepped block beside a plate with a notch, a window and a hole,
-//! and the recipe that finds that plate.
+//! In: a rig's design. Out: a scene that fills its field: a stepped block beside a plate with a notch, a window and a
+//! hole, and the recipe that finds that plate.
 //! Frame and unit: scene frame, z up, the laser on the side of -y; mm. Lengths of the default rig times its scale.
 
 use super::rig::RigSpec;
@@ -99,7 +99,8 @@ impl RigSpec {
              [[shape]]\nkind = \"polygon\"\npoints = [{outline}]\n\n\
              [[shape]]\nkind = \"rectangle\"\ninside = \"low\"\ncentre = {window}\nsize = {size}\n\n\
              [[shape]]\nkind = \"circle\"\ninside = \"low\"\ncentre = {hole}\nradius = {radius:.6}\n\n\
-             [insertion]\napproach_mm = {above:.6}\nretract_mm = {above:.6}\ntolerance_mm = {bears:.6}\ntolerance_deg = 0.5\n\n\
+             [insertion]\napproach_mm = {above:.6}\nretract_mm = {above:.6}\ntolerance_mm = {bears:.6}\n\
+             tolerance_deg = 0.5\n\n\
              [gates]\nmax_sigma_mm = {sigma:.6}\n\n[robot]\nsigma_mm = 0\nsigma_deg = 0\n",
             name = self.name.replace('"', "'"),
             cell = 1.4 * step,

@@ -17,8 +17,8 @@ pub struct Sensor {
     pub read_noise_e: f64,
     /// Speckle contrast per pixel, 0..=0.6 (0 = none).
     pub speckle: f64,
-    /// Sigma of the blur that makes the speckle's grains, px, 0..=9; 0: each pixel's speckle is its own. A diffraction-limited lens has
-    /// 0.42 wavelengths times its f-number.
+    /// Sigma of the blur that makes the speckle's grains, px, 0..=9; 0: each pixel's speckle is its own. A
+    /// diffraction-limited lens has 0.42 wavelengths times its f-number.
     pub grain_px: f64,
     /// Room light that leaks into laser pictures: grey of a white surface as share of full scale, 0..=0.9.
     pub ambient_leak: f64,

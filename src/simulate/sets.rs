@@ -1,5 +1,5 @@
-//! In: a set of recordings, a station, a scene. Out: what stands before the camera at each of its shots, where the robot or the axis
-//! is, and what is true of it.
+//! In: a set of recordings, a station, a scene. Out: what stands before the camera at each of its shots, where the
+//! robot or the axis is, and what is true of it.
 //! Frame and unit: scene, base, camera, board; mm.
 
 use super::light::InScene;
@@ -44,7 +44,8 @@ pub(super) struct Plan {
     pub motion: Option<Motion>,
 }
 
-/// The board that rides on an axis when no other is named: small enough to be in the picture along some way of it, or all around.
+/// The board that rides on an axis when no other is named: small enough to be in the picture along some way of it, or
+/// all around.
 pub fn riding_board(rig: &RigSpec) -> BoardSpec {
     chessboard(9, 6, 6.0, 5.0, rig.board_scale())
 }
@@ -108,7 +109,8 @@ impl Plan {
         let [near, far] = station.pointer_range;
         let half = 1.4 * far;
         let plate = SceneSpec::parse(&format!(
-            "name = 'plate'\nregion_mm = [{a}, {a}, {half}, {half}]\n[[solid]]\nshape = {{ block = {{ size_mm = [{s}, {s}, 5] }} }}\nat_mm = [0, 0, 0]",
+            "name = 'plate'\nregion_mm = [{a}, {a}, {half}, {half}]\n[[solid]]\nshape = {{ block = {{ size_mm = \
+             [{s}, {s}, 5] }} }}\nat_mm = [0, 0, 0]",
             a = -half,
             s = 3.1 * far,
         ));
@@ -126,8 +128,9 @@ impl Plan {
 
     /// The boards of a set from which camera, hand-eye, laser plane or pointer is calibrated.
     fn show_boards(&mut self, station: &Station, options: &SimulateOptions) -> Result<()> {
-        // Poses of boards whose middle is so many working distances away, and how large boards are beside those that the
-        // default rig sees there: they come into the picture whole, and nobody holds one outside the working volume.
+        // Poses of boards whose middle is so many working distances away, and how large boards are beside those that
+        // the default rig sees there: they come into the picture whole, and nobody holds one outside the working
+        // volume.
         let (rig, z) = (&station.rig, station.working_distance);
         let views = |count, wanted: [f64; 2], tilt_deg, turn_deg| {
             let [near, far] = rig.board_distances(wanted, z);

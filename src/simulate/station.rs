@@ -148,7 +148,8 @@ impl Station {
         self.calibrations(None).store_all(folder).map(|_| ())
     }
 
-    /// The true values as a calibrated rig; with `base_from_camera` of a sensor that stands still there, in place of the one on the flange.
+    /// The true values as a calibrated rig; with `base_from_camera` of a sensor that stands still there, in place of
+    /// the one on the flange.
     pub fn calibrations(&self, base_from_camera: Option<Rigid<Base, Camera>>) -> Rig {
         let quality = Quality {
             verdict: Verdict::Good,
@@ -220,8 +221,8 @@ fn camera(rig: &RigSpec, off: &mut impl FnMut(f64, f64) -> f64) -> Intrinsics {
     }
 }
 
-/// The sheet of light, and the depth at which it crosses the optical axis, mm: the design's but for what `off` adds; the
-/// source lies on the laser's side.
+/// The sheet of light, and the depth at which it crosses the optical axis, mm: the design's but for what `off` adds;
+/// the source lies on the laser's side.
 fn laser(rig: &RigSpec, off: &mut impl FnMut(f64, f64) -> f64) -> (LineLaser, f64) {
     let l = &rig.laser;
     let (baseline, angle) =

@@ -1,6 +1,7 @@
 //! In: `truth.json` of a simulated recording. Out: the exact surface and poses, and how far measured
 //! points are from them.
-//! Frame and unit: the cloud's frame (base; of a part that rides on an axis the axis frame), mm; keys named `A_T_b` map coordinates in frame b to frame A.
+//! Frame and unit: the cloud's frame (base; of a part that rides on an axis the axis frame), mm; keys named `A_T_b`
+//! map coordinates in frame b to frame A.
 
 use super::light::InScene;
 use super::scene::{Scene, SceneSpec, part_pose};
@@ -154,7 +155,7 @@ impl Truth {
         let strange = |what: String| {
             Fault::input(format!("{}: {what}", path.display()))
                 .cause("not the truth.json of a simulated scan")
-                .next("give the truth.json beside the scan's meta.json")
+                .next("give the truth.json beside the recording's meta.json")
         };
         let file: TruthFile = serde_json::from_str(&text).map_err(|e| strange(format!("cannot be read: {e}")))?;
         let (Some(spec), Some(pose)) = (file.scene.clone(), file.base_from_scene) else {

@@ -247,7 +247,8 @@ impl Plan {
 /// A point list as binary PLY (x y z, float32).
 fn points_ply(points: &[Vec3]) -> Vec<u8> {
     let mut out = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment units mm, base frame\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+        "ply\nformat binary_little_endian 1.0\ncomment units mm, base frame\nelement vertex {}\nproperty float \
+         x\nproperty float y\nproperty float z\nend_header\n",
         points.len()
     )
     .into_bytes();

@@ -32,7 +32,8 @@ impl ConsensusOptions {
             || !(1..=1_000_000).contains(&self.max_draws)
         {
             return Err(Fault::usage(format!(
-                "consensus options out of range: threshold {} (above 0), confidence {} (0.5 to 1), max_draws {} (1 to 1000000)",
+                "consensus options out of range: threshold {} (above 0), confidence {} (0.5 to 1), max_draws {} (1 \
+                 to 1000000)",
                 self.threshold, self.confidence, self.max_draws
             ))
             .next("choose values in these ranges"));

@@ -41,8 +41,8 @@ pub struct Frame {
     pub full_scale: u32,
     /// Most pixels added to an end of a line, and from bit 16 on the share of brightness in 4096ths; 0 is off.
     pub lengthen: u32,
-    /// Pixels from one of a run across the stripe to the next ([`crate::stages::stripe::spacing::word`]), and whether lit pixels need
-    /// company ([`crate::stages::stripe::spacing::COMPANY`]); 0 keeps all.
+    /// Pixels from one of a run across the stripe to the next ([`crate::stages::stripe::spacing::word`]), and whether
+    /// lit pixels need company ([`crate::stages::stripe::spacing::COMPANY`]); 0 keeps all.
     pub spacing: u32,
 }
 
@@ -150,8 +150,8 @@ impl Frame {
         }
     }
 
-    /// Hands rows of a picture to `put` piece by piece (byte offset behind the first of them, bytes): padded to whole tiles
-    /// with their last pixel.
+    /// Hands rows of a picture to `put` piece by piece (byte offset behind the first of them, bytes): padded to whole
+    /// tiles with their last pixel.
     pub fn put_rows(&self, image: &Image, rows: Range<u32>, put: &mut dyn FnMut(usize, &[u8])) -> Result<()> {
         self.accept(image)?;
         let (bytes, px): (&[u8], usize) = match &image.pixels {

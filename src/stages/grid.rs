@@ -69,7 +69,8 @@ pub struct GridFrame {
     pub reserved: u32,
 }
 
-const UNIFORM: (&str, &[Field], usize) = super::frame::uniform_fields!(GridFrame: width, height, layer_steps, points, least_quality,
+const UNIFORM: (&str, &[Field], usize) = super::frame::uniform_fields!(GridFrame: width, height, layer_steps,
+    points, least_quality,
     origin_x, origin_y, origin_z, xx, xy, xz, yx, yy, yz, zx, zy, zz, shift_x, shift_y, shift_z, add_x_low, add_x_high,
     add_y_low, add_y_high, add_z_low, add_z_high, intensity_places, reserved);
 
@@ -327,8 +328,8 @@ pub(crate) fn pick_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-/// Cases of one of the three stages: a tilted plate with a block and strays far from the base's origin, all points in one
-/// cell, numbers that are none.
+/// Cases of one of the three stages: a tilted plate with a block and strays far from the base's origin, all points in
+/// one cell, numbers that are not finite.
 pub fn cases(stage: &str) -> Vec<Case> {
     let mut noise = super::noise::Noise(11);
     let mut normal = |sigma: f64| sigma * noise.normal();
@@ -354,7 +355,7 @@ pub fn cases(stage: &str) -> Vec<Case> {
     [
         ("tilted plate", GridFrame::new(&tilt, [61, 43], (0.5, 0.001), 300, 0.0, 80.0), &plate),
         ("one cell, quality", GridFrame::new(&tilt, [1, 1], (50.0, 0.003), 100, 0.6, 60_000.0), &plate),
-        ("numbers that are none", GridFrame::new(&flat, [5, 3], (1.0, 1.0 / 32_767.0), 10, 0.0, 255.0), &strange),
+        ("numbers that are not finite", GridFrame::new(&flat, [5, 3], (1.0, 1.0 / 32_767.0), 10, 0.0, 255.0), &strange),
     ]
     .into_iter()
     .map(|(name, mut f, records)| {

@@ -1,4 +1,5 @@
-//! In: the chain's table, the stages beside it. Out: every stage with its twin, its cases and how far the two may be apart.
+//! In: the chain's table, the stages beside it. Out: every stage with its twin, its cases and how far the two may be
+//! apart.
 //! Frame and unit: each stage's own.
 
 use super::chain::table::steps;
@@ -37,7 +38,8 @@ pub fn all() -> Vec<Entry> {
             Same::Within(
                 peak::apart,
                 1.0,
-                "exp differs by some ulps, and a fit may stop one step earlier: position 0.01 px or 0.01 sigma, width 1 %",
+                "exp differs by some ulps, and a fit may stop one step earlier: position 0.01 px or 0.01 sigma, \
+                 width 1 %",
             ),
         ),
         words(&choose::LINES, choose::lines_twin, || cases::peaks("lines")),

@@ -114,7 +114,8 @@ pub const REBASING: Step = Step {
     same: Same::Words,
 };
 
-/// Adds an entry, a tile or a run of them: [`COUNT`] of the header counts, [`GROUPS`] is the number of workgroups of 64 entries.
+/// Adds an entry, a tile or a run of them: [`COUNT`] of the header counts, [`GROUPS`] is the number of workgroups of
+/// 64 entries.
 pub fn append<const N: usize>(listing: &mut [u32], list: &mut [u32], entry: [u32; N]) {
     list[N * listing[COUNT] as usize..][..N].copy_from_slice(&entry);
     listing[GROUPS] += u32::from(listing[COUNT].is_multiple_of(64));

@@ -1,5 +1,5 @@
-//! In: the constants of the stages. Out: those that a shader names too, by its names: each is stated once here and once there, and
-//! tests/shader_contracts.rs compares them. Frame and unit: each number's own.
+//! In: the constants of the stages. Out: those that a shader names too, by its names: each is stated once here and
+//! once there, and tests/shader_contracts.rs compares them. Frame and unit: each number's own.
 
 use super::frame::{ALL_TILES, GAUSSIAN, HAS_ROI};
 use super::listing::{self, HEADER_WORDS};

@@ -6,7 +6,8 @@
 pub enum Same {
     /// Every word is the same.
     Words,
-    /// The same but for the order of lists: (binding, words an entry); their number stands in word 3 of the binding before.
+    /// The same but for the order of lists: (binding, words an entry); their number stands in word 3 of the binding
+    /// before.
     Lists(&'static [(usize, usize)]),
     /// A difference of its own, the largest allowed, and why.
     Within(fn(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64, f64, &'static str),
@@ -48,8 +49,8 @@ pub fn differing_words(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
         .sum::<usize>() as f64
 }
 
-/// As `differing_words`, where some bindings are lists in any order: (binding, words an entry). The number of entries is
-/// word 3 of the binding before the list; which tile takes which place is up to the GPU's scheduler.
+/// As `differing_words`, where some bindings are lists in any order: (binding, words an entry). The number of entries
+/// is word 3 of the binding before the list; which tile takes which place is up to the GPU's scheduler.
 pub fn differing_words_beside_order(gpu: &[Vec<u32>], twin: &[Vec<u32>], lists: &[(usize, usize)]) -> f64 {
     let sorted = |b: &[Vec<u32>]| {
         let mut b = b.to_vec();

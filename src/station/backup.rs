@@ -1,4 +1,5 @@
-//! In: a station. Out: all that a person chose and measured of it in one file, and the way back; jobs and recordings are none of it.
+//! In: a station. Out: all that a person chose and measured of it in one file, and the way back; jobs and recordings
+//! are none of it.
 //! Frame and unit: texts, as they lie in the station.
 
 use super::settings::Settings;
@@ -98,7 +99,8 @@ impl Backup {
                 .cause("another file, edited, or cut off")
                 .next("give a file that sheetlight station backup wrote")
         };
-        let b: Backup = serde_json::from_str(text).map_err(|e| strange(format!("is no backup of a station: {e}")))?;
+        let b: Backup =
+            serde_json::from_str(text).map_err(|e| strange(format!("is not a backup of a station: {e}")))?;
         if b.format != FORMAT {
             return Err(strange(format!("is of format {}, this version reads {FORMAT}", b.format)));
         }
@@ -123,7 +125,8 @@ impl Backup {
         crate::files::write(path, serde_json::to_string_pretty(self).expect("plain data").as_bytes())
     }
 
-    /// Puts a station into the state of the backup; what it has beside that stays (jobs, recordings, logs). All of it or nothing.
+    /// Puts a station into the state of the backup; what it has beside that stays (jobs, recordings, logs). All of it
+    /// or nothing.
     ///
     /// # Errors
     /// A backup whose settings or calibrations this version refuses, the disk: the station is as it was then.

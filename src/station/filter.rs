@@ -1,4 +1,5 @@
-//! In: a finished scan, filters. Out: another scan folder with the points and cells that they leave, and what was done in its report.
+//! In: a finished scan, filters. Out: another scan folder with the points and cells that they leave, and what was
+//! done in its report.
 //! Frame and unit: the scan's; filters in its height map's grid, mm.
 
 use super::scan::products;
@@ -51,7 +52,7 @@ pub fn filter_scan(scan: &Path, filters: &[Filter], out: &Path) -> Result<ScanRe
     let stays = left(&before, &map);
     let points: Vec<CloudPoint> = cloud.into_iter().filter(|p| stays(&p.position)).collect();
     if points.len() < FEWEST {
-        return Err(Fault::refused(format!("{} points are left, {FEWEST} are wanted", points.len()))
+        return Err(Fault::refused(format!("{} points are left, {FEWEST} are needed", points.len()))
             .cause("the filters take nearly everything away")
             .next("take the strictest of them back"));
     }

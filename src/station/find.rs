@@ -24,8 +24,9 @@ pub struct Looked<'a> {
     pub range: Option<&'a Recording>,
 }
 
-/// Finds the recipe's part in one or more finished scans of it and brings them together ([`agree`]), with the pointer's distances
-/// as a witness of the height; the picture is the first scan's. Errors: those of each scan; of several, the first.
+/// Finds the recipe's part in one or more finished scans of it and brings them together ([`agree`]), with the
+/// pointer's distances as a witness of the height; the picture is the first scan's. Errors: those of each scan; of
+/// several, the first.
 pub fn find_part_in_all(
     looked: &Looked,
     recipe: &Recipe,
@@ -56,12 +57,12 @@ pub fn find_part_in_all(
     Ok((agree(reports, witness.as_ref(), recipe, options.robot)?, picture))
 }
 
-/// Refuses looks that cannot show anything: without the station nothing says what they may disagree about, and one scan agrees
-/// with itself whatever is wrong.
+/// Refuses looks that cannot show anything: without the station nothing says what they may disagree about, and one
+/// scan agrees with itself whatever is wrong.
 fn comparable(scans: &[PathBuf], station: Option<&Path>) -> Result<()> {
     if station.is_none() {
-        return Err(Fault::usage("looks are to be compared, and no station is given")
-            .cause("what they may disagree about comes from the covariances of the calibrations")
+        return Err(Fault::usage("several scans are compared, but no station is given")
+            .cause("the expected disagreement follows from the covariances of the calibrations")
             .next("name the station that scanned with --station"));
     }
     different(scans)
@@ -107,8 +108,8 @@ pub fn second_look(
     let motion = load_report(scan)?.motion;
     if motion.frame() != "base" {
         return Err(Fault::usage(format!("{}: was scanned in the {} frame", scan.display(), motion.frame()))
-            .cause("no robot moved the sensor, so none can be sent for a second look")
-            .next("scan the part again as it lies otherwise on the axis"));
+            .cause("no robot moved the sensor, so no second scan can be planned")
+            .next("scan the part again in another position on the axis"));
     }
     let (report, _) = find_part(scan, recipe, Some(station), &LocateOptions::default())?;
     let plan = plan_look(&report, &parts_for(&Rig::load(station)?, &motion), turn_deg, tilt_deg)?;

@@ -1,5 +1,6 @@
-//! In: where a part was found, its drawing, a rig whose camera rides on the robot, where the flange stood. Out: the part's outlines as that
-//! camera sees them: over its picture they lie on the part, or the calibration, the pose or the part is not what it is taken for.
+//! In: where a part was found, its drawing, a rig whose camera rides on the robot, where the flange stood. Out: the
+//! part's outlines as that camera sees them: over its picture they lie on the part, or the calibration, the pose or
+//! the part is not what it is taken for.
 //! Frame and unit: base frame, mm; pixels of the camera's picture, an integer pixel is a pixel's centre.
 
 use crate::camera::Intrinsics;
@@ -40,7 +41,7 @@ impl Lies {
     /// It is none.
     pub fn parse(text: &str) -> Result<Lies> {
         serde_json::from_str(text).map_err(|e| {
-            Fault::input(format!("is no report of a part that was found: {e}"))
+            Fault::input(format!("is not a report of a part that was found: {e}"))
                 .cause(format!("another file (SHA-256 {:.12})", hash_text(text.as_bytes())))
                 .next("give the JSON that sheetlight find --out wrote")
         })

@@ -83,11 +83,11 @@ impl GuideOptions {
     pub fn check(&self) -> Result<()> {
         let (tilt, view) = (self.max_tilt_deg, self.view_mm.unwrap_or(1.0));
         if !(0.1..=20.0).contains(&tilt) {
-            return Err(Fault::usage(format!("max_tilt_deg is {tilt}, wanted 0.1 to 20")).next("correct the option"));
+            return Err(Fault::usage(format!("max_tilt_deg is {tilt}; allowed: 0.1 to 20")).next("correct the option"));
         }
         if !(view > 0.0 && view.is_finite()) {
             return Err(
-                Fault::usage(format!("view_mm is {view}, a distance above 0 is wanted")).next("correct the option")
+                Fault::usage(format!("view_mm is {view}, a distance above 0 is needed")).next("correct the option")
             );
         }
         Ok(())
@@ -270,7 +270,7 @@ fn touched_words(r: &RangeReport) -> Vec<String> {
             s.normal[0], s.normal[1], s.normal[2], s.tilt_sigma_deg[0], s.rms_mm
         ));
         out.extend(
-            s.left_out.iter().map(|n| format!("{n} was left out: its spot does not lie on the plane of the others")),
+            s.left_out.iter().map(|n| format!("{n} was excluded: its spot does not lie on the plane of the others")),
         );
     }
     out

@@ -1,5 +1,6 @@
-//! In: pictures of the pointer's spot on a part, the part as scans found it, the station. Out: by how much each spot lies above
-//! the part's surfaces, with all that it depends on: a witness of the height that knows nothing of the laser plane.
+//! In: pictures of the pointer's spot on a part, the part as scans found it, the station. Out: by how much each spot
+//! lies above the part's surfaces, with all that it depends on: a witness of the height that knows nothing of the
+//! laser plane.
 //! Frame and unit: base axes; mm, rad. docs/math.md, Second look (7).
 
 use super::range::{RangeRun, Touched, touched};
@@ -43,7 +44,7 @@ pub(super) fn height_witness(
     for (picture, p) in &points {
         match height(&part.inverse().point(&p.point), recipe) {
             Ok(height) => on.push((height, p)),
-            Err(why) => said.push(format!("range: {picture}: {why}; left out")),
+            Err(why) => said.push(format!("range: {picture}: {why}; excluded")),
         }
     }
     if on.is_empty() {
@@ -52,7 +53,7 @@ pub(super) fn height_witness(
             points.len(),
             said.join("; ")
         ))
-        .cause("the pointer was aimed beside the part, or at an edge or a hole of it")
+        .cause("the pointer did not hit the part, or hit an edge or a hole of it")
         .next("aim the pointer at plain places of the part's top"));
     }
     Ok((witness(&on, &shared, &part.direction(&Vec3::z()), &part.translation), said))

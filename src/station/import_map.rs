@@ -1,5 +1,5 @@
-//! In: a height map or cloud of another sensor, and what its user states about it. Out: a scan folder on which `find` works, with where
-//! it came from.
+//! In: a height map or cloud of another sensor, and what its user states about it. Out: a scan folder on which `find`
+//! works, with where it came from.
 //! Frame and unit: the file's own frame, which the folder calls map; mm.
 
 use super::scan::products;
@@ -23,7 +23,8 @@ const NO_RIG: &str = "imported";
 /// Longest file, bytes: 64 million points of 36 bytes.
 const MOST_BYTES: u64 = 36 << 26;
 
-/// Makes a scan folder of a file, or of the `page` of it (from 1 on); `light` is the picture of the light that came with a picture of heights.
+/// Makes a scan folder of a file, or of the `page` of it (from 1 on); `light` is the picture of the light that came
+/// with a picture of heights.
 ///
 /// # Errors
 /// Files that are not read, what must be stated and is not, a folder that holds a scan of a rig.

@@ -1,5 +1,5 @@
-//! In: an arm that was taken, one of its outputs. Out: that output tried: lasers light for a moment, the lamp changes for a moment, the
-//! gripper goes where it is told. Nothing moves.
+//! In: an arm that was taken, one of its outputs. Out: that output tried: lasers light for a moment, the lamp changes
+//! for a moment, the gripper goes where it is told. Nothing moves.
 //! Frame and unit: numbers of the controller's outputs; s.
 
 use crate::arm::{Arm, Outputs, Switchboard};
@@ -35,7 +35,7 @@ pub enum Output {
     Pointer,
     /// The room's lamp.
     Room,
-    /// The gripper opens: what it holds falls.
+    /// The gripper opens and drops its component.
     Open,
     /// The gripper closes.
     Close,

@@ -16,8 +16,8 @@ use crate::rig::{Calibration, HandEye, Rig};
 
 /// A beam can be wrong by its calibration, too: so far beside its image a spot is forgiven, px.
 const FORGIVEN_PX: f64 = 1.0;
-/// A spot that an edge cuts lies beside its beam by less than this many sigmas of its profile: with nine tenths of it cut away,
-/// what is left of a normal profile has its middle at 1.75.
+/// A spot that an edge cuts lies beside its beam by less than this many sigmas of its profile: with nine tenths of it
+/// cut away, what is left of a normal profile has its middle at 1.75.
 const CUT: f64 = 2.0;
 
 /// How [`measure_range`] is run.

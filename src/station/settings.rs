@@ -47,7 +47,8 @@ pub struct Settings {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ToolSpec {
-    /// Flange from tool, 16 numbers row by row, mm. The tool's origin is what goes to the part's, its z points against the insertion.
+    /// Flange from tool, 16 numbers row by row, mm. The tool's origin is what goes to the part's, its z points
+    /// against the insertion.
     pub flange_from_tool: Rigid<Flange, Tool>,
 }
 
@@ -55,8 +56,8 @@ pub struct ToolSpec {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeadSpec {
-    /// Its outermost points in the flange's frame, mm, at most 2000 from the flange: every motion keeps them slow and out of keep-outs.
-    /// None of them: nothing of the sensor rides on the flange.
+    /// Its outermost points in the flange's frame, mm, at most 2000 from the flange: every motion keeps them slow and
+    /// out of keep-outs. None of them: nothing of the sensor rides on the flange.
     pub points_mm: Vec<[f64; 3]>,
 }
 
@@ -136,21 +137,21 @@ impl Settings {
         }
         if let Some(mm) = self.tolerance_mm.filter(|mm| !(*mm > 0.0 && mm.is_finite())) {
             return Err(Fault::input(format!("tolerance_mm is {mm}, a length above 0 mm is needed"))
-                .next("give what the work tolerates in millimetres, or leave the key out"));
+                .next("give the tolerance in millimetres, or remove the key"));
         }
         if let Some(mm) = self.tolerance_mm.filter(|mm| !(FINEST..=COARSEST).contains(mm)) {
             let unit = if mm < FINEST { "metres" } else { "micrometres" };
             return Err(Fault::input(format!(
-                "tolerance_mm is {mm}, which looks like {unit}; {FINEST} to {COARSEST} is believed"
+                "tolerance_mm is {mm}, which looks like {unit}; {FINEST} to {COARSEST} is accepted"
             ))
             .cause(format!("{unit} instead of millimetres"))
-            .next("give what the work tolerates in millimetres, or leave the key out"));
+            .next("give the tolerance in millimetres, or remove the key"));
         }
         let head = self.head.iter().flat_map(|h| &h.points_mm).map(|p| ("head.points_mm", Vec3::from(*p)));
         let tool = self.tool.iter().map(|t| ("tool.flange_from_tool", t.flange_from_tool.translation));
         if let Some((name, p)) = head.chain(tool).find(|(_, p)| !(p.norm() <= LEVER)) {
             return Err(Fault::input(format!(
-                "{name}: a point lies {:.0} mm from the flange, at most {LEVER} is believed",
+                "{name}: a point lies {:.0} mm from the flange, at most {LEVER} is accepted",
                 p.norm()
             ))
             .cause("another unit than millimetres, or a point that is not in the flange's frame")

@@ -1,5 +1,5 @@
-//! In: a station, scans of a flat surface, scans of one object from several sides, touched points. Out: what the fits said and, apart from it,
-//! what checks with other data say.
+//! In: a station, scans of a flat surface, scans of one object from several sides, touched points. Out: what the fits
+//! said and, apart from it, what checks with other data say.
 //! Frame and unit: base frame; mm, px, degrees.
 
 use super::find::{different, fits};
@@ -30,7 +30,8 @@ pub struct VerifyRun {
 /// How scans of one object agree.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct ObjectCheck {
-    /// By scan: its name, the share of its surfaces that the first scan saw too, and their distance from those, rms, mm.
+    /// By scan: its name, the share of its surfaces that the first scan saw too, and their distance from those, rms,
+    /// mm.
     pub scans: Vec<(String, f64, f64)>,
     /// Along the base's axes about the object's middle.
     pub looks: Disagreement,
@@ -88,7 +89,7 @@ pub fn verify(rig: &Rig, run: &VerifyRun) -> Result<VerifyReport> {
     add("linear axis", rig.linear_axis.as_ref().map(check));
     add("turntable", rig.turntable.as_ref().map(check));
     if calibrations.is_empty() {
-        return Err(Fault::input("the station holds no calibration")
+        return Err(Fault::input("the station has no calibration")
             .cause("another folder was given as --station")
             .next("calibrate it first"));
     }
@@ -153,7 +154,8 @@ impl ObjectCheck {
         let best = l.explained_by.first().filter(|_| l.ratio > RATIO || l.misfit_sigmas > RATIO)?;
         let off: Vec<String> = best.off_by.iter().map(|(name, by)| format!("{name} by {by:+.3}")).collect();
         Some(format!(
-            "the scans of the object disagree by {:.1} times what the calibrations state; the {} explains {:.0} % of it, were it wrong in {}",
+            "the scans of the object disagree by {:.1} times what the calibrations state; the {} explains {:.0} % of \
+             it, were it wrong in {}",
             l.ratio,
             best.name,
             100.0 * best.share,

@@ -1,5 +1,5 @@
-//! In: station.toml, the calibrations of a rig, what the command line states. Out: the depths in which points are believed
-//! and those at which calibrations are judged, each with its origin.
+//! In: station.toml, the calibrations of a rig, what the command line states. Out: the depths in which points are
+//! believed and those at which calibrations are judged, each with its origin.
 //! Frame and unit: along the camera's optical axis, mm.
 
 use super::Settings;
@@ -15,8 +15,8 @@ pub fn calibrated(rig: &Rig) -> Option<Volume> {
     (near < far).then(|| Volume::new(near, far, "where the laser plane's boards stood"))
 }
 
-/// Depths at which a scan's points are believed: those that station.toml states, else those of the laser plane's boards and
-/// as far again. `None`: nobody knows, every depth is believed.
+/// Depths at which a scan's points are believed: those that station.toml states, else those of the laser plane's
+/// boards and as far again. `None`: nobody knows, every depth is believed.
 pub fn believed(settings: &Settings, rig: &Rig) -> Option<Volume> {
     settings.volume().or_else(|| calibrated(rig).map(|v| v.extended()))
 }
@@ -29,7 +29,7 @@ pub fn view(settings: &Settings, rig: &Rig) -> Result<Volume> {
     let plane = rig.need_laser_plane()?.value;
     let z = plane.offset / plane.normal.z;
     if !(z > 0.0 && z.is_finite()) {
-        return Err(Fault::usage("how far the camera is to look at the surface from is not known")
+        return Err(Fault::usage("the distance of the square view is unknown")
             .cause("the sheet does not meet the camera's axis in front of it, and no working volume is stated")
             .next("state the distance with --view-mm, or [working_volume] in station.toml"));
     }

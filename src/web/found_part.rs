@@ -1,4 +1,5 @@
-//! In: a job that found a part, a station's folder. Out: where the part lies, its drawing and the rig, kept for a while.
+//! In: a job that found a part, a station's folder. Out: where the part lies, its drawing and the rig, kept for a
+//! while.
 //! Frame and unit: base frame, mm.
 
 use super::work::{Jobs, lies, report_of};

@@ -1,5 +1,5 @@
-//! In: a job that found a part, a picture of the camera on the gripper, where the robot stood then. Out: the part's outlines over that
-//! picture, and how far they may be off because the arm moved.
+//! In: a job that found a part, a picture of the camera on the gripper, where the robot stood then. Out: the part's
+//! outlines over that picture, and how far they may be off because the arm moved.
 //! Frame and unit: base frame, mm; px of the picture.
 
 use super::message::{Ghost, Outlines};
@@ -18,7 +18,7 @@ pub fn moment(screen: &Screen, number: u64) -> Result<u64> {
         Fault::input("no camera: the screen was served without --camera").next("start it with --camera URI")
     })?;
     if screen.robot().is_none() {
-        return Err(Fault::input("no robot: where the camera stands is not known")
+        return Err(Fault::input("no robot: the camera's pose is unknown")
             .cause("the screen was served without --robot")
             .next("start it with --robot URI"));
     }
@@ -37,7 +37,7 @@ pub fn known(screen: &Screen, at_ns: u64) -> bool {
 pub fn over(screen: &Screen, id: &str, number: u64, at_ns: u64) -> Result<Ghost> {
     let about = screen.robot().and_then(|r| r.track().about(at_ns));
     let Some([before, after]) = about else {
-        return Err(Fault::refused("where the robot stood when this picture was taken is not known")
+        return Err(Fault::refused("the robot's pose of this picture is unknown")
             .cause("its controller does not answer, or the picture is older than the link to it")
             .next("look at the robot's state in the bar; the ghost comes back with its poses"));
     };
@@ -48,7 +48,8 @@ pub fn over(screen: &Screen, id: &str, number: u64, at_ns: u64) -> Result<Ghost>
     Ok(Ghost { number, lines, moved_px })
 }
 
-/// The farthest that a point of the one lies from the same point of the other, px; as far as the picture is long where they are not alike.
+/// The farthest that a point of the one lies from the same point of the other, px; as far as the picture is long
+/// where they are not alike.
 fn farthest(a: &[Vec<[f64; 2]>], b: &[Vec<[f64; 2]>]) -> f64 {
     const LOST: f64 = 1e4;
     if a.iter().map(Vec::len).ne(b.iter().map(Vec::len)) {

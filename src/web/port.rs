@@ -1,4 +1,5 @@
-//! In: an address and a port. Out: somebody who listens there, or on the next free port; who has the one that was asked for.
+//! In: an address and a port. Out: somebody who listens there, or on the next free port; who has the one that was
+//! asked for.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};

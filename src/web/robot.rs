@@ -1,4 +1,5 @@
-//! In: a robot's URI. Out: what its controller says, read over and over on a thread of its own; a link that breaks is opened again.
+//! In: a robot's URI. Out: what its controller says, read over and over on a thread of its own; a link that breaks is
+//! opened again.
 //! Frame and unit: poses base_from_flange, mm.
 
 use super::message::RobotState;

@@ -69,11 +69,13 @@ const LOOK: Duration = Duration::from_millis(100);
 /// The bar is told so often.
 const BAR: Duration = Duration::from_secs(1);
 
-/// Serves until `stop`; `simulated` is the cell that robot and camera are of, where it is one of ours. `ready` is told the address to open, with
-/// the token of this start behind `#`, and where its port is another than was asked for why.
+/// Serves until `stop`; `simulated` is the cell that robot and camera are of, where it is one of ours. `ready` is
+/// told the address to open, with the token of this start behind `#`, and where its port is another than was asked
+/// for why.
 ///
 /// # Errors
-/// A station that is none or in use by another server, an address that cannot be listened on or is not guarded, bad TLS files.
+/// A station that is none or in use by another server, an address that cannot be listened on or is not guarded, bad
+/// TLS files.
 pub fn serve(
     options: &ServeOptions,
     simulated: Option<SimulatedRobot>,
@@ -120,7 +122,7 @@ fn runtime() -> Result<Runtime> {
 
 fn check(options: &ServeOptions) -> Result<()> {
     if !options.station.join("station.toml").is_file() {
-        return Err(Fault::usage(format!("{}: is no station, it has no station.toml", options.station.display()))
+        return Err(Fault::usage(format!("{}: not a station (no station.toml)", options.station.display()))
             .cause("another folder was given, or the station was never made")
             .next("make one with sheetlight station new --station FOLDER, or look around first with --simulate"));
     }
@@ -129,8 +131,8 @@ fn check(options: &ServeOptions) -> Result<()> {
         Some(s) => verify("", &s.password).map(|_| ()),
         None if options.address.is_loopback() => Ok(()),
         None => Err(Fault::usage(format!("{} is not this machine's own address", options.address))
-            .cause("who reaches this screen can order scans, and motions where a robot is linked")
-            .next("give --password-file, --tls-cert and --tls-key, or leave --listen out")),
+            .cause("anybody who reaches this screen can order scans and, with a linked robot, motions")
+            .next("give --password-file, --tls-cert and --tls-key, or omit --listen")),
     }
 }
 

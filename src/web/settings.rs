@@ -1,4 +1,5 @@
-//! In: what an operator changes of the station. Out: its station.toml changed, backed up before, or a refusal; backups and the way back.
+//! In: what an operator changes of the station. Out: its station.toml changed, backed up before, or a refusal;
+//! backups and the way back.
 //! Frame and unit: none.
 
 use super::message::{BackupInfo, SettingsAsk, SettingsState};
@@ -58,7 +59,7 @@ pub fn change(screen: &Screen, ask: &SettingsAsk) -> Result<SettingsState> {
     let path = screen.place.station.join("station.toml");
     let text = crate::files::read_text(&path)?;
     if hash_text(text.as_bytes()) != ask.sha256 {
-        return Err(Fault::refused("the settings are other ones by now")
+        return Err(Fault::refused("station.toml changed since this page loaded")
             .cause("another screen or an editor has changed station.toml since this page read it")
             .next("load the page again and make the change there"));
     }
@@ -68,7 +69,7 @@ pub fn change(screen: &Screen, ask: &SettingsAsk) -> Result<SettingsState> {
             new.clone()
         }
         None => edited(&text, &ask.changes)?,
-        Some(_) => return Err(Fault::usage("a whole text and single settings at once").next("send one of them")),
+        Some(_) => return Err(Fault::usage("a whole text and single settings in one request").next("send one of them")),
     };
     if new != text {
         back_up_here(&screen.place.station, "before-settings")?;
@@ -105,12 +106,12 @@ pub fn backup(screen: &Screen, name: &str) -> Result<Vec<u8>> {
 fn free(screen: &Screen) -> Result<()> {
     if let Some(job) = screen.jobs.running() {
         return Err(Fault::refused(format!("{job} runs"))
-            .cause("it works with the settings as they are")
+            .cause("it uses the present settings")
             .next("wait until it has ended, or stop it"));
     }
     if screen.desk.armed() {
         return Err(Fault::refused("the robot is armed")
-            .cause("its limits were read when it was armed, and hold until it is given back")
+            .cause("its limits were read when it was armed, and apply until it is released")
             .next("give the arm back, then change the settings"));
     }
     Ok(())

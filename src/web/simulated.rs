@@ -1,5 +1,5 @@
-//! In: a folder. Out: a simulated cell that runs in this process, a station in the folder that fits it, and recordings to scan, made
-//! once: a first look at the product without camera, robot or GPU.
+//! In: a folder. Out: a simulated cell that runs in this process, a station in the folder that fits it, and
+//! recordings to scan, made once: a first look at the product without camera, robot or GPU.
 //! Frame and unit: as recordings; px.
 
 use super::for_cell::station_for;
@@ -8,7 +8,8 @@ use crate::fault::Result;
 use crate::simulate::{Set, SimulateOptions, simulate};
 use std::path::{Path, PathBuf};
 
-/// Cell and controller share this machine with everything else that runs on it: their link may be silent for so long, ms.
+/// Cell and controller share this machine with everything else that runs on it: their link may be silent for so long,
+/// ms.
 const SILENCE_MS: f64 = 2000.0;
 
 /// What is simulated.
@@ -26,8 +27,8 @@ pub struct SimulatedOptions {
     pub speed: f64,
 }
 
-/// Starts the cell, and makes `folder/station` and recordings beside it where they are not there yet; `progress` counts pictures.
-/// Gives the station.
+/// Starts the cell, and makes `folder/station` and recordings beside it where they are not there yet; `progress`
+/// counts pictures. Gives the station.
 pub fn simulated(
     folder: &Path,
     options: &SimulatedOptions,

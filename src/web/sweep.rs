@@ -1,5 +1,5 @@
-//! In: a recipe, the station, where the robot stands, what the camera sends, what was measured of it. Out: the sweep that a job would make,
-//! and how fast a scan along it goes.
+//! In: a recipe, the station, where the robot stands, what the camera sends, what was measured of it. Out: the sweep
+//! that a job would make, and how fast a scan along it goes.
 //! Frame and unit: poses in the robot's own notation; mm, mm/s, pictures a second.
 
 use super::message::{JobState as State, Order, Outcome, SweepAsk, SweepPlan};

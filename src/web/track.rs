@@ -1,4 +1,5 @@
-//! In: poses of the flange as they are read. Out: where it stood when a picture was taken, and how far it moved about then.
+//! In: poses of the flange as they are read. Out: where it stood when a picture was taken, and how far it moved about
+//! then.
 //! Frame and unit: base_from_flange, mm; ns of the host's clock.
 
 use crate::geometry::{Base, Flange, Rigid};
@@ -43,7 +44,8 @@ impl Track {
         self.0.back().map(|s| s.pose)
     }
 
-    /// The readings before and after a moment; twice the same where the arm stood. `None`: nothing was read before or after it.
+    /// The readings before and after a moment; twice the same where the arm stood. `None`: nothing was read before or
+    /// after it.
     pub fn about(&self, at_ns: u64) -> Option<[Rigid<Base, Flange>; 2]> {
         let after = self.0.partition_point(|s| s.to_ns < at_ns);
         let next = self.0.get(after)?;

@@ -1,4 +1,5 @@
-//! In: nothing. Out: a station and a small recording of a straight stripe in a temporary folder, and what attacks on them need.
+//! In: nothing. Out: a station and a small recording of a straight stripe in a temporary folder, and what attacks on
+//! them need.
 //! Frame and unit: base frame, mm; pixels.
 
 use super::common::sheetlight;

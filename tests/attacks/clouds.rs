@@ -100,7 +100,8 @@ fn teaching() {
 fn robots() {
     let listing = |x: &str, w: &str| {
         let text = format!(
-            "/PROG A\n/POS\nP[1]{{\n GP1:\n UF : 0, UT : 1, CONFIG : 'N U T, 0, 0, 0',\n X = {x} mm, Y = 0 mm, Z = 0 mm,\n W = {w} deg, P = 10 deg, R = 0 deg\n}};\n/END\n"
+            "/PROG A\n/POS\nP[1]{{\n GP1:\n UF : 0, UT : 1, CONFIG : 'N U T, 0, 0, 0',\n X = {x} mm, Y = 0 mm, Z = 0 \
+             mm,\n W = {w} deg, P = 10 deg, R = 0 deg\n}};\n/END\n"
         );
         move || {
             sheetlight::robot::fanuc_tp::read::<Base, Flange>(&text).map(|p| {

@@ -1,4 +1,5 @@
-//! In: commands that are killed, or whose disk fills up, at each of their file operations, and scans that are told to stop.
+//! In: commands that are killed, or whose disk fills up, at each of their file operations, and scans that are told to
+//! stop.
 //! Out: the old result whole, or the new one, or the same bytes after --resume.
 //! Frame and unit: none. SHEETLIGHT_LONG tries every operation; else every some are tried.
 
@@ -178,7 +179,8 @@ fn full_disks() {
     let whole = results(&b.at("whole"));
     let (disk, mut full) = (b.at("disk"), 0);
     std::fs::create_dir(&disk).unwrap();
-    // In a name space of its own: the disk goes with the shell. $0 is the disk, $1 where the scan is copied to, $2 its size.
+    // In a name space of its own: the disk goes with the shell. $0 is the disk, $1 where the scan is copied to, $2
+    // its size.
     let script = "mount -t tmpfs -o size=$2k tmpfs \"$0\" || exit 9; kept=$1; shift 2; \"$@\"; code=$?; \
                   test ! -e \"$0/out/cloud.ply\" || test $code = 0 || exit 8; \
                   if test $code != 0; then mount -o remount,size=64m \"$0\" && \"$@\" --resume || exit 7; fi; \
@@ -293,7 +295,8 @@ fn signals_end_a_stream_with_what_came() {
     assert!(refused(&args).contains("gave 0 frames, the pose file has 12 poses"));
 }
 
-/// Two scans that are started into one folder at once: one waits or is refused, and the folder holds one of them, whole.
+/// Two scans that are started into one folder at once: one waits or is refused, and the folder holds one of them,
+/// whole.
 #[test]
 fn two_at_once_do_not_mix() {
     let b = Bench::new(20);

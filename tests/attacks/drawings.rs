@@ -1,4 +1,5 @@
-//! In: recipes, DXF drawings and scenes that ask for more than there is: too many shapes, too large, too far, not finite.
+//! In: recipes, DXF drawings and scenes that ask for more than there is: too many shapes, too large, too far, not
+//! finite.
 //! Out: an answer within seconds. Frame and unit: mm.
 
 use crate::table::{Case, Good, Want::Says, case, check};
@@ -12,8 +13,8 @@ use sheetlight::find::search::full::find;
 use sheetlight::find::search::options::SearchOptions;
 use std::fmt::Write;
 
-/// Everything that `find` does with a drawing before it looks at points, and a search of a map of 60 x 40 mm with nothing
-/// on it but a step.
+/// Everything that `find` does with a drawing before it looks at points, and a search of a map of 60 x 40 mm with
+/// nothing on it but a step.
 fn used(text: &str) -> Result<(), Fault> {
     let drawing = Drawing::parse(text)?;
     let model = ShapeModel::from_drawing(&drawing, 0.4, Kind::Height, &ModelOptions::default())?;
@@ -162,7 +163,8 @@ fn scenes() {
     use sheetlight::simulate::{Scene, SceneSpec};
     let scene = |more: &str| {
         let text = format!(
-            "name = 'a'\nregion_mm = [-10, -10, 10, 10]\n[[solid]]\nshape = {{ ball = {{ diameter_mm = 3 }} }}\nat_mm = [0, 0, 0]\n{more}"
+            "name = 'a'\nregion_mm = [-10, -10, 10, 10]\n[[solid]]\nshape = {{ ball = {{ diameter_mm = 3 }} \
+             }}\nat_mm = [0, 0, 0]\n{more}"
         );
         move || SceneSpec::parse(&text).and_then(Scene::new)
     };

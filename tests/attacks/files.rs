@@ -1,5 +1,5 @@
-//! In: calibration files, recordings, scan folders and outputs that were edited, mixed or exchanged. Out: each is refused by
-//! name with a next step, and nothing of what was there is lost.
+//! In: calibration files, recordings, scan folders and outputs that were edited, mixed or exchanged. Out: each is
+//! refused by name with a next step, and nothing of what was there is lost.
 //! Frame and unit: base frame, mm.
 
 use super::bench::{Bench, VALUES, refused, run, snapshot, stripe};
@@ -202,7 +202,7 @@ fn an_import_is_all_or_nothing() {
         ("[1, 0, 0, 90", "[-1, 0, 0, 90", ""),
         ("[1, 0, 0, 90", "[1, 0.1, 0, 90", "orthonormal"),
         ("-0.6, 0.8", "-0.6, 0.9", "long"),
-        ("\"offset_mm\": 72", "\"offset_mm\": \"72\"", "holds no rig values"),
+        ("\"offset_mm\": 72", "\"offset_mm\": \"72\"", "contains no rig values"),
     ] {
         let text = VALUES.replacen(from, to, 1);
         assert_ne!(text, VALUES, "{from}");

@@ -1,5 +1,5 @@
-//! In: every file that a command reads, replaced by a pipe, an endless device, a file of gigabytes, a folder, nothing. Out: a fault within
-//! seconds and within 3 GB of addresses, and nothing that was there is gone.
+//! In: every file that a command reads, replaced by a pipe, an endless device, a file of gigabytes, a folder,
+//! nothing. Out: a fault within seconds and within 3 GB of addresses, and nothing that was there is gone.
 //! Frame and unit: none.
 #![cfg(target_os = "linux")]
 
@@ -31,8 +31,8 @@ fn take_away(path: &Path) {
     }
 }
 
-/// A file that is read (`{}` stands for the bench's folder), and the command that reads it; where the file may be missing,
-/// or is read past, the command may succeed.
+/// A file that is read (`{}` stands for the bench's folder), and the command that reads it; where the file may be
+/// missing, or is read past, the command may succeed.
 const READ: [(&str, &str, bool); 31] = [
     ("x", "scan {}/recording --station {}/station --out {}/o --ambient {}/x --on cpu", false),
     ("x.json", "scan --raw 320x240:gray8 --poses {}/x.json --station {}/station --out {}/o --on cpu", false),
@@ -59,12 +59,14 @@ const READ: [(&str, &str, bool); 31] = [
     ("x.csv", "calibrate hand-eye --board-poses {}/boards.csv --poses {}/x.csv --station {}/station", false),
     (
         "x.csv",
-        "calibrate profile-hand-eye {}/x.csv --poses {}/recording/poses.json --station {}/station --ball-diameter-mm 20",
+        "calibrate profile-hand-eye {}/x.csv --poses {}/recording/poses.json --station {}/station --ball-diameter-mm \
+         20",
         false,
     ),
     (
         "x.json",
-        "calibrate profile-hand-eye {}/p.csv --poses {}/recording/poses.json --ball-diameter-mm 20 --evaluate {}/x.json",
+        "calibrate profile-hand-eye {}/p.csv --poses {}/recording/poses.json --ball-diameter-mm 20 --evaluate \
+         {}/x.json",
         false,
     ),
     ("x.png", "match {}/x.png {}/recording/1.png", false),
@@ -85,7 +87,9 @@ fn whatever_lies_where_a_file_is_wanted() {
     let here = b.dir.path().to_str().unwrap();
     let led = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/recipes/led.toml");
     std::fs::copy(led, b.at("led.toml")).unwrap();
-    let boards = "# transform: camera_T_board\n# convention: matrix\nframe,m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23,m30,m31,m32,m33\n0,1,0,0,0,0,1,0,0,0,0,1,300,0,0,0,1\n";
+    let boards = "# transform: camera_T_board\n# convention: \
+                  matrix\nframe,m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23,m30,m31,m32,m33\n\
+                  0,1,0,0,0,0,1,0,0,0,0,1,300,0,0,0,1\n";
     std::fs::write(b.at("boards.csv"), boards).unwrap();
     std::fs::write(b.at("p.csv"), "profile,x,z\n0,1.5,2.5\n0,2.5,3.5\n1,1,2\n1,2,3\n2,1,2\n2,2,3\n").unwrap();
     run(&b.scan("recording", "scan", &[]));

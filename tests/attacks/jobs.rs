@@ -1,5 +1,5 @@
-//! In: folders of jobs that a person, a disk or another program has touched. Out: none of them moves a robot: what is not as it was
-//! written is refused, and a job goes on with nothing but what its poses were made from.
+//! In: folders of jobs that a person, a disk or another program has touched. Out: none of them moves a robot: what is
+//! not as it was written is refused, and a job goes on with nothing but what its poses were made from.
 //! Frame and unit: base frame, mm.
 
 use sheetlight::fault::Fault;

@@ -1,5 +1,5 @@
-//! In: what careless and hostile users give the program. Out: a table (case, expected, got): each case is answered with a
-//! result or with a fault that names number, limit and next step; none panics, hangs or floods the memory.
+//! In: what careless and hostile users give the program. Out: a table (case, expected, got): each case is answered
+//! with a result or with a fault that names number, limit and next step; none panics, hangs or floods the memory.
 //! Frame and unit: none.
 
 #[path = "../common/mod.rs"]

@@ -77,8 +77,8 @@ fn calling<'a>(text: &'a str, names: &'a [&'a str]) -> impl Iterator<Item = Stri
     lines.map(|(n, l)| format!("{n}: {}", l.trim()))
 }
 
-/// What others wrote is read within limits and never from a pipe, what is written can be stopped at any moment, where no thread
-/// can be had that is said, and what is printed goes to outputs that may be closed or full.
+/// What others wrote is read within limits and never from a pipe, what is written can be stopped at any moment, where
+/// no thread can be had that is said, and what is printed goes to outputs that may be closed or full.
 #[test]
 fn files_threads_and_outputs_are_had_in_one_way() {
     let around = [

@@ -1,4 +1,5 @@
-//! In: pose files and station.toml with numbers, units, columns and signs that cannot be. Out: a fault that names them, or the poses that they hold.
+//! In: pose files and station.toml with numbers, units, columns and signs that cannot be. Out: a fault that names
+//! them, or the poses that they hold.
 //! Frame and unit: as each file says.
 
 use crate::table::{Case, Good, Want, Want::Says, case, check};
@@ -68,7 +69,13 @@ fn units_and_columns() {
         csv("semicolons", Says(&["semicolons"]), with("denso", "frame;x;y;z;rx;ry;rz", "1;1,5;2;3;4;5;6")),
         csv("decimal commas", Says(&["13 columns"]), denso("1,400,5,0,5,300,5,170,5,10,5,20,5")),
         csv("a byte order mark", Good, format!("\u{feff}{}", denso("1,400,0,300,170,10,20"))),
-        csv("no header", Says(&["numbers where the columns"]), "# convention: denso\n0,400,0,300,170,10,20\n".into()),
+        csv(
+            "no header",
+            Says(&["numbers instead of column names"]),
+            "# convention: \
+            denso\n0,400,0,300,170,10,20\n"
+                .into(),
+        ),
         csv("no convention", Says(&["without a convention"]), "frame,x,y,z,rx,ry,rz\n0,400,0,300,170,10,20\n".into()),
         csv(
             "a quaternion of length 1.41",

@@ -1,5 +1,6 @@
-//! In: every command that writes, killed, or its disk full, at each of its file operations. Out: its result is the former one
-//! or the new one, whole, and what stands beside it belongs to it; run again, it ends as if nothing had been.
+//! In: every command that writes, killed, or its disk full, at each of its file operations. Out: its result is the
+//! former one or the new one, whole, and what stands beside it belongs to it; run again, it ends as if nothing had
+//! been.
 //! Frame and unit: none. SHEETLIGHT_LONG tries every operation of all commands; else those of the quick ones.
 
 use super::bench::{run, snapshot};
@@ -22,7 +23,8 @@ fn inputs() -> &'static Path {
             let frame = "0\nLWPOLYLINE\n90\n4\n70\n1\n10\n0\n20\n0\n10\n40\n20\n0\n10\n40\n20\n30\n10\n0\n20\n30\n";
             let hole = format!("0\nCIRCLE\n10\n20\n20\n15\n40\n{diameter}\n");
             let text = format!(
-                "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n{frame}{hole}0\nENDSEC\n0\nEOF\n"
+                "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n{frame}{hole}0\n\
+                ENDSEC\n0\nEOF\n"
             );
             std::fs::write(at(&format!("{n}.dxf")), text).unwrap();
             let seed = n.to_string();
@@ -32,7 +34,8 @@ fn inputs() -> &'static Path {
             let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/rigs/paper.toml");
             simulate.extend(["--rig".to_owned(), rig.to_str().unwrap().into()]);
             run(&simulate);
-            let mut scan = vec!["scan".to_owned(), at(&format!("sim{n}/scan")), "--out".into(), at(&format!("scan{n}"))];
+            let mut scan =
+                vec!["scan".to_owned(), at(&format!("sim{n}/scan")), "--out".into(), at(&format!("scan{n}"))];
             scan.extend(["--station".to_owned(), at(&format!("sim{n}/station"))]);
             scan.extend(["--quiet", "--on", "cpu", "--overlays", "0"].map(str::to_owned));
             run(&scan);
@@ -57,7 +60,8 @@ fn inputs() -> &'static Path {
 
 /// A command under attack.
 struct Stopped {
-    /// Its words; `{n}` is the number of the input, `{in}` the folder of all inputs, `{work}` the folder it writes into.
+    /// Its words; `{n}` is the number of the input, `{in}` the folder of all inputs, `{work}` the folder it writes
+    /// into.
     words: String,
     /// The file that counts, in `{work}`, and those that are shown beside it.
     result: &'static str,
@@ -116,7 +120,8 @@ impl Stopped {
                     }
                     run(&self.args(&work, 1));
                     let again = content(&snapshot(&work));
-                    // A joint calibration begins at the records that are there: from the new ones it comes to other last digits.
+                    // A joint calibration begins at the records that are there: from the new ones it comes to other
+                    // last digits.
                     let begun_anew = self.read_first && content(&found).get(&result) == new.get(&result);
                     let wrong: Vec<_> = new.keys().filter(|f| is_kept(f) && again.get(*f) != new.get(*f)).collect();
                     let wrong = if begun_anew { vec![] } else { wrong };
@@ -286,7 +291,8 @@ fn calibrating() {
             every: 7,
             read_first: true,
             ..calibration(
-                "calibrate joint {in}/cal{n}/handeye {in}/cal{n}/laserplane {in}/cal{n}/pointer_cal --poses poses_noisy \
+                "calibrate joint {in}/cal{n}/handeye {in}/cal{n}/laserplane {in}/cal{n}/pointer_cal --poses \
+                 poses_noisy \
                  --station {work} --on cpu --keep-badly-determined",
                 "calibration/joint.json",
             )

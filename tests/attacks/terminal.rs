@@ -1,4 +1,5 @@
-//! In: the program with its output closed, full or cut off, with names that steer a terminal, with hardly any memory for
+//! In: the program with its output closed, full or cut off, with names that steer a terminal, with hardly any memory
+//! for
 //! threads. Out: a sensible exit code, and no panic. Frame and unit: none.
 #![cfg(target_os = "linux")]
 

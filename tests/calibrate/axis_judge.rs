@@ -1,4 +1,5 @@
-//! In: random cameras before random linear axes and turntables, boards that ride on them, sound sets of stops and flawed ones.
+//! In: random cameras before random linear axes and turntables, boards that ride on them, sound sets of stops and
+//! flawed ones.
 //! Out: whether the axis is found with an honest sigma, and no flawed set passes with an error that its sigma denies.
 //! Frame and unit: camera frame; mm, rad, px.
 
@@ -221,9 +222,9 @@ fn set<'a>(rng: &mut Pcg64, r: &'a Rig, count: usize, flaw: Flaw, believed: &Int
     Set { stops, moved: Box::new(moved) }
 }
 
-/// How far the found axis puts the board's corners from where they truly go, against the middle of the way, rms, and what is
-/// stated of that; mm. Over a linear axis' way, over a whole turn of a table that runs true. `sense` is 1 or -1: an encoder that
-/// counts up whichever way it goes is right for one of the two.
+/// How far the found axis puts the board's corners from where they truly go, against the middle of the way, rms, and
+/// what is stated of that; mm. Over a linear axis' way, over a whole turn of a table that runs true. `sense` is 1 or
+/// -1: an encoder that counts up whichever way it goes is right for one of the two.
 fn error(r: &Rig, s: &Set, fit: &AxisFit, flaw: Flaw, sense: f64) -> (f64, [f64; 2]) {
     let (low, high) = fit.counts.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), c| (a.min(*c), b.max(*c)));
     let middle = (low + high) / 2.0;
@@ -307,7 +308,8 @@ fn a_flawed_set_never_passes_with_an_error_above_three_sigmas() {
             let count = |v| of.iter().filter(|c| c.verdict == v).count();
             let over = |k: usize| of.iter().copied().filter(passed).map(move |c| c.error / c.sigma[k]);
             println!(
-                "{kind:?} {flaw:?}: good {}, usable {}, badly determined {}, refused {}; error over sigma of those that passed: \
+                "{kind:?} {flaw:?}: good {}, usable {}, badly determined {}, refused {}; error over sigma of those \
+                 that passed: \
                  rms {:.2}, worst {:.2}; over that of direction and pitch alone: rms {:.2}",
                 count(Some(Verdict::Good)),
                 count(Some(Verdict::Usable)),

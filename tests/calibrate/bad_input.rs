@@ -108,7 +108,7 @@ fn pictures_without_a_board_are_named_with_the_reason() {
     let cut: Vec<u8> = (0..640 * 480).map(|i| whole[i / 640 * 640 + (i % 640 + 340) % 640]).collect();
     c.overwrite("ambient_0005.png", &Image::from_u8(640, 480, cut));
     let reasons = c.succeeds("camera", &[])["quality"]["reasons"].to_string();
-    for want in ["ambient_0003.png was left out", "grey levels span", "ambient_0005.png was left out", "cut off"] {
+    for want in ["ambient_0003.png was excluded", "grey levels span", "ambient_0005.png was excluded", "cut off"] {
         assert!(reasons.contains(want), "'{want}' is missing in {reasons}");
     }
     (0..20).for_each(|i| c.overwrite(&format!("ambient_{i:04}.png"), &black()));
@@ -207,7 +207,7 @@ fn wrong_pairs_and_outlier_pictures_are_named() {
     let found = c.succeeds("hand-eye", &NOISY);
     let reasons = found["quality"]["reasons"].to_string();
     for name in ["ambient_0002.png", "ambient_0007.png", "ambient_0011.png"] {
-        assert!(reasons.contains(&format!("{name} was left out")), "{name}: {reasons}");
+        assert!(reasons.contains(&format!("{name} was excluded")), "{name}: {reasons}");
     }
     assert_eq!(found["quality"]["verdict"], "usable", "{reasons}");
     // One picture of the board bent by half a square: its corners no longer lie on the lattice.
@@ -223,7 +223,7 @@ fn wrong_pairs_and_outlier_pictures_are_named() {
         .collect();
     c.overwrite("ambient_0006.png", &Image::from_u8(640, 480, bent));
     let reasons = c.succeeds("camera", &[])["quality"]["reasons"].to_string();
-    assert!(reasons.contains("ambient_0006.png was left out"), "{reasons}");
+    assert!(reasons.contains("ambient_0006.png was excluded"), "{reasons}");
 }
 
 #[test]

@@ -145,8 +145,8 @@ fn errors_are_as_small_as_they_can_be_and_as_large_as_reported() {
     });
 }
 
-/// Boards that bow like a sheet on a bench, with a print that is long and skewed: of such pictures the camera is as good as stated, and far
-/// better than from the drawing. Neither the bow nor the print's ripple is a polynomial.
+/// Boards that bow like a sheet on a bench, with a print that is long and skewed: of such pictures the camera is as
+/// good as stated, and far better than from the drawing. Neither the bow nor the print's ripple is a polynomial.
 #[test]
 fn a_board_that_is_not_as_drawn_is_solved_for() {
     let (mut shaped, mut drawn, mut off) = (0.0, 0.0, 0.0);
@@ -191,7 +191,8 @@ fn a_board_that_is_not_as_drawn_is_solved_for() {
     assert!(shaped < 0.3 * drawn, "{shaped} {drawn}");
 }
 
-/// The same of boards that look alike after a half turn and are read either way, and of boards whose pictures show a part of them.
+/// The same of boards that look alike after a half turn and are read either way, and of boards whose pictures show a
+/// part of them.
 #[test]
 fn a_board_that_is_not_as_drawn_may_be_read_either_way_and_be_cut_off() {
     let board =
@@ -329,7 +330,7 @@ fn one_outlier_picture_is_found_and_named() {
     let result = judged(pictures, &s);
     assert_eq!(result.left_out.len(), 1);
     assert_eq!(result.left_out[0].0, "picture 5");
-    assert!(result.calibration.quality.reasons.iter().any(|r| r.contains("picture 5 was left out")));
+    assert!(result.calibration.quality.reasons.iter().any(|r| r.contains("picture 5 was excluded")));
 }
 
 #[test]

@@ -66,8 +66,8 @@ fn pose(v: &Value) -> Matrix4<f64> {
     Matrix4::from_row_slice(&rows)
 }
 
-/// The same recording as a colour camera takes it with the lamps on: room light of another exposure in the laser's pictures, the
-/// laser in the red alone.
+/// The same recording as a colour camera takes it with the lamps on: room light of another exposure in the laser's
+/// pictures, the laser in the red alone.
 fn with_lamps_on(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).unwrap();
     let mut meta = json(&from.join("meta.json"));
@@ -214,7 +214,8 @@ fn a_station_is_calibrated_ranged_and_verified_by_its_commands() {
         let sigma = figure(d, &["along_axis_sigma_mm"]);
         assert!(e.abs() < 4.0 * sigma.max(0.005), "at {z} mm: {e:+.4} mm, sigma {sigma:.4}");
     }
-    // Half a spot is not where the beam is, and is refused; asked roughly it tells how far the surface is. Near by, where spots are wide.
+    // Half a spot is not where the beam is, and is refused; asked roughly it tells how far the surface is. Near by,
+    // where spots are wide.
     let spots: Vec<[f64; 2]> =
         distances.iter().map(|d| serde_json::from_value(d["spot_px"].clone()).unwrap()).collect();
     with_spots_cut(&s.at.join("pointer"), &s.at.join("cut"), &spots[..4]);
@@ -257,7 +258,8 @@ fn a_flat_surface_is_verified_from_several_scans() {
     let scene = dir.path().join("plate.toml");
     std::fs::write(
         &scene,
-        "name = 'plate'\nregion_mm = [-25, -6, 25, 6]\n[[solid]]\nshape = { block = { size_mm = [90, 60, 5] } }\nat_mm = [0, 0, 0]\n",
+        "name = 'plate'\nregion_mm = [-25, -6, 25, 6]\n[[solid]]\nshape = { block = { size_mm = [90, 60, 5] } \
+         }\nat_mm = [0, 0, 0]\n",
     )
     .unwrap();
     let s = Simulated::new("scan", &["--seed", "7", "--shots", "12", "--scene", text(&scene)]);
@@ -328,7 +330,8 @@ fn a_profile_sensor_is_calibrated_from_files() {
         let flange: Rigid<Base, Flange> = base_from_sensor * sensor.inverse();
         let n = sheetlight::robot::Convention::Fanuc.write(&flange);
         listing += &format!(
-            "P[{}]{{\n   GP1:\n    UF : 0, UT : 0, CONFIG : 'N U T, 0, 0, 0',\n    X = {:.3} mm, Y = {:.3} mm, Z = {:.3} mm,\n    W = {:.4} deg, P = {:.4} deg, R = {:.4} deg\n}};\n",
+            "P[{}]{{\n   GP1:\n    UF : 0, UT : 0, CONFIG : 'N U T, 0, 0, 0',\n    X = {:.3} mm, Y = {:.3} mm, Z = \
+             {:.3} mm,\n    W = {:.4} deg, P = {:.4} deg, R = {:.4} deg\n}};\n",
             i + 1,
             n[0],
             n[1],

@@ -1,5 +1,5 @@
-//! In: a simulated station: the pointer's spots on a circuit board, the line over the part on it. Out: `sheetlight guide`
-//! from the touch to the retract, against the station's truth, and where it must stop.
+//! In: a simulated station: the pointer's spots on a circuit board, the line over the part on it. Out:
+//! `sheetlight guide` from the touch to the retract, against the station's truth, and where it must stop.
 //! Frame and unit: base frame, part axes; mm, degrees.
 
 use crate::common::{sheetlight, sheetlight_fails};
@@ -105,5 +105,5 @@ fn an_operator_is_led_from_the_touch_to_the_retract() {
         .collect();
     let (code, said) = sheetlight_fails(&swapped.iter().map(String::as_str).collect::<Vec<_>>());
     println!("{code}: {said}");
-    assert!(code == 1 && said.contains("the pointer is wanted here"), "{said}");
+    assert!(code == 1 && said.contains("the pointer is needed here"), "{said}");
 }

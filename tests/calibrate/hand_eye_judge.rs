@@ -240,7 +240,8 @@ fn the_cameras_uncertainty_reaches_the_report() {
     }
     let root = |x: f64| x.sqrt();
     println!(
-        "over sigma: transform {:.3}, joint camera {:.3}, a point {:.3}, with the joint camera {:.3}; camera taken as exact {:.1}; \
+        "over sigma: transform {:.3}, joint camera {:.3}, a point {:.3}, with the joint camera {:.3}; camera taken \
+         as exact {:.1}; \
          surprise over freedom {surprise:.3}; point's error over that with the camera held {:.3}",
         root(over),
         root(camera),
@@ -293,8 +294,8 @@ fn a_noisy_robot_gets_its_transform_with_an_honest_sigma() {
     }
 }
 
-/// Scoring of the noise that overshoots had left the robot's turns and the boards without any here, and a sigma 4800 times too small:
-/// one set of 600.
+/// Scoring of the noise that overshoots had left the robot's turns and the boards without any here, and a sigma 4800
+/// times too small: one set of 600.
 #[test]
 fn noise_that_is_shared_among_three_sources_does_not_vanish() {
     let rng = &mut Pcg64::seed_from_u64(9476);

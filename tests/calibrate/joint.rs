@@ -1,4 +1,5 @@
-//! In: simulated stations with known truth. Out: whether the joint calibration is as good as it says, and as it must be.
+//! In: simulated stations with known truth. Out: whether the joint calibration is as good as it says, and as it must
+//! be.
 //! Frame and unit: mm, rad, px.
 
 mod accuracy;

@@ -276,8 +276,8 @@ fn reflections_on_and_beside_the_board_do_not_enter() {
     assert!((0..3).all(|i| e[i].abs() < 0.7 * c[(i, i)].sqrt()), "{e}");
 }
 
-/// Light that an edge of the print or a hot pixel moved by a part of a pixel, eight of its sigmas, in a piece of each stripe: it is left out,
-/// and is no second plane.
+/// Light that an edge of the print or a hot pixel moved by a part of a pixel, eight of its sigmas, in a piece of each
+/// stripe: it is left out, and is no second plane.
 #[test]
 fn moved_pieces_of_the_stripe_are_no_second_plane() {
     let rng = &mut Pcg64::seed_from_u64(7);
@@ -350,8 +350,8 @@ fn call(seed: u64, flaw: Flaw) -> Called {
     }
 }
 
-/// Users live in a space of rigs and of mistakes: any depth from 60 mm to 1.5 m, lying, upright and diagonal stripes, the
-/// laser on every side, 1 to 14 boards, narrow and wide ranges of depth.
+/// Users live in a space of rigs and of mistakes: any depth from 60 mm to 1.5 m, lying, upright and diagonal stripes,
+/// the laser on every side, 1 to 14 boards, narrow and wide ranges of depth.
 #[test]
 fn a_flawed_set_never_passes_with_an_error_above_three_sigmas() {
     let each = if std::env::var_os("SHEETLIGHT_LONG").is_some() { 300 } else { 50 };
@@ -365,7 +365,8 @@ fn a_flawed_set_never_passes_with_an_error_above_three_sigmas() {
         let count = |v| of.iter().filter(|c| c.verdict == v).count();
         let over: Vec<f64> = of.iter().copied().filter(passed).map(|c| c.error / c.sigma).collect();
         println!(
-            "{flaw:?}: good {}, usable {}, badly determined {}, refused {}; error over sigma of those that passed: rms {:.2}, \
+            "{flaw:?}: good {}, usable {}, badly determined {}, refused {}; error over sigma of those that passed: \
+             rms {:.2}, \
              worst {:.2}",
             count(Some(Verdict::Good)),
             count(Some(Verdict::Usable)),

@@ -1,5 +1,5 @@
-//! ChArUco boards as OpenCV drew them before 4.6 (even number of rows: the first square is white), against the corners that
-//! OpenCV itself finds with its legacy pattern, in pixels.
+//! ChArUco boards as OpenCV drew them before 4.6 (even number of rows: the first square is white), against the
+//! corners that OpenCV itself finds with its legacy pattern, in pixels.
 
 use sheetlight::calibrate::boards::{FindOptions, find};
 use sheetlight::calibrate::homography::homography;

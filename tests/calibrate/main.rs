@@ -1,5 +1,5 @@
-//! In: simulated stations, rendered recordings and photographs with known truth. Out: whether each calibration is as good as it
-//! can be, says how good it is, and refuses what cannot be calibrated.
+//! In: simulated stations, rendered recordings and photographs with known truth. Out: whether each calibration is as
+//! good as it can be, says how good it is, and refuses what cannot be calibrated.
 //! Frame and unit: mm, degrees, px, as each file says.
 
 #[path = "../common/mod.rs"]

@@ -1,7 +1,9 @@
-//! In: simulated stations with known truth, a part seen from two sides, and stations or recordings made wrong by one edit.
-//! Out: judgement on the second look: no wrong pose passes, right ones do, sigmas are honest, one look says that it was not
-//! cross-checked. Peaks are the engine's, from rendered pictures; noise is drawn. Frame and unit: base frame; mm, degrees.
-//! SHEETLIGHT_LONG: ten stations of as many designs, thirty right draws each; a design's name: the stations of that one alone.
+//! In: simulated stations with known truth, a part seen from two sides, and stations or recordings made wrong by one
+//! edit.
+//! Out: judgement on the second look: no wrong pose passes, right ones do, sigmas are honest, one look says that it
+//! was not cross-checked. Peaks are the engine's, from rendered pictures; noise is drawn. Frame and unit: base frame;
+//! mm, degrees. SHEETLIGHT_LONG: ten stations of as many designs, thirty right draws each; a design's name: the
+//! stations of that one alone.
 
 mod edits;
 mod imported;
@@ -78,7 +80,8 @@ fn tried(world: &World, name: &str, edit: fn(&mut Believed, &mut [Recorded; 2]))
         off.in_plane().max(off.in_height())
     };
     println!(
-        "{}, {name}: one look off by {:.3} mm ({}), both by {:.3} mm ({}), ratio {:.1}, misfit {:.1}, best explained by {:?}",
+        "{}, {name}: one look off by {:.3} mm ({}), both by {:.3} mm ({}), ratio {:.1}, misfit {:.1}, best explained \
+         by {:?}",
         world.station.rig.name,
         off(&alone[0]),
         if others(&alone[0]) { "passed" } else { "refused" },
@@ -184,7 +187,8 @@ fn right_stations_pass_two_looks_and_the_pose_is_as_good_as_it_says() {
     let (one, two) = (rms(&all, &|r| r.one), rms(&all, &|r| r.two));
     let worse = all.iter().filter(|r| r.worse).count();
     println!(
-        "{passed} of {n} pass; error over stated sigma {one:.2?} of one look, {two:.2?} of two; worse in the plane: {worse}"
+        "{passed} of {n} pass; error over stated sigma {one:.2?} of one look, {two:.2?} of two; worse in the plane: \
+         {worse}"
     );
     assert!(passed * 100 >= n * 99 - if long() { 0 } else { 100 }, "{passed} of {n} right ones pass");
     // What 0.8 to 1.25 comes to in six draws of one station but once in a thousand: chi squared of six, 0.38 and 22.5.

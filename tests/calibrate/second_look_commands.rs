@@ -1,4 +1,5 @@
-//! In: a simulated station whose calibrations know their uncertainty, a part seen from where `second-look` sends the robot.
+//! In: a simulated station whose calibrations know their uncertainty, a part seen from where `second-look` sends the
+//! robot.
 //! Out: `find A B` and `second-look` as a user runs them: exit codes, JSON, and what they say of looks that are none.
 //! Frame and unit: base frame, part axes; mm, degrees.
 
@@ -16,16 +17,26 @@ use std::path::{Path, PathBuf};
 fn scene(x: f64, y: f64) -> String {
     let balls: String = [(21.5, -7.0), (22.0, 4.0), (-21.5, -5.0), (-22.0, 6.0)]
         .iter()
-        .map(|(x, y)| format!("[[solid]]\nshape = {{ ball = {{ diameter_mm = 9 }} }}\nat_mm = [{x}, {y}, 7]\nmaterial = {{ albedo = 0.6 }}\n"))
+        .map(|(x, y)| {
+            format!(
+                "[[solid]]\nshape = {{ ball = {{ diameter_mm = 9 }} }}\nat_mm = [{x}, {y}, \
+                               7]\nmaterial = {{ albedo = 0.6 }}\n"
+            )
+        })
         .collect();
     format!(
         "name = 'led'\nregion_mm = [-27, -13, 27, 13]\nfocus_height_mm = 2.0\n\
-         [[solid]]\nshape = {{ block = {{ size_mm = [190, 104, 1.6] }} }}\nat_mm = [0, 0, 0]\nmaterial = {{ albedo = 0.45 }}\n\
+         [[solid]]\nshape = {{ block = {{ size_mm = [190, 104, 1.6] }} }}\nat_mm = [0, 0, 0]\n\
+         material = {{ albedo = 0.45 }}\n\
          [[part]]\nname = 'led'\nat_mm = [{x}, {y}, 4.2]\nturn_deg = 3\n\
-         [[part.solid]]\nshape = {{ block = {{ size_mm = [30.48, 17.78, 4.2] }} }}\nat_mm = [0, 0, 0]\nmaterial = {{ albedo = 0.5 }}\n\
-         [[part.solid.cut]]\nshape = {{ cone = {{ top_mm = 1.44, bottom_mm = 0.84, depth_mm = 2.5 }} }}\nrepeat = [12, 2]\npitch_mm = [2.54, 15.24]\n\
-         [[part.solid.cut]]\nshape = {{ block = {{ size_mm = [11.04, 12.4, 9] }} }}\nrepeat = [2, 1]\npitch_mm = [14.24, 0]\n\
-         [[part.solid.cut]]\nshape = {{ cylinder = {{ diameter_mm = 3, depth_mm = 9 }} }}\nat_mm = [-15.24, 0, 0]\n{balls}"
+         [[part.solid]]\nshape = {{ block = {{ size_mm = [30.48, 17.78, 4.2] }} }}\nat_mm = [0, 0, 0]\n\
+         material = {{ albedo = 0.5 }}\n\
+         [[part.solid.cut]]\nshape = {{ cone = {{ top_mm = 1.44, bottom_mm = 0.84, depth_mm = 2.5 }} }}\n\
+         repeat = [12, 2]\npitch_mm = [2.54, 15.24]\n\
+         [[part.solid.cut]]\nshape = {{ block = {{ size_mm = [11.04, 12.4, 9] }} }}\nrepeat = [2, 1]\n\
+         pitch_mm = [14.24, 0]\n\
+         [[part.solid.cut]]\nshape = {{ cylinder = {{ diameter_mm = 3, depth_mm = 9 }} }}\nat_mm = [-15.24, 0, \
+         0]\n{balls}"
     )
 }
 
@@ -99,7 +110,8 @@ fn state_uncertainty(station: &Path) {
     rig.store_all(station).unwrap();
 }
 
-/// Where the robot stands for the pointer's spot on plain places of the part's top: between the windows and at the ends.
+/// Where the robot stands for the pointer's spot on plain places of the part's top: between the windows and at the
+/// ends.
 fn spots(out: &Path) {
     let station = Station::random(3);
     let (ray, turn) = (station.pointer.ray(), 3f64.to_radians());
@@ -174,7 +186,8 @@ fn a_second_look_is_planned_taken_and_brought_together() {
     assert!((0..3).all(|k| both.by[k].abs() < 3.0 * sigma[k]), "{both:?} {sigma:?}");
     assert!(both.in_plane() < 0.05 && both.in_height() < 0.05, "{both:?}");
 
-    // The pointer's distances agree; the spot at the part's edge is left out. One scan with them is checked in its height only.
+    // The pointer's distances agree; the spot at the part's edge is left out. One scan with them is checked in its
+    // height only.
     spots(&b.at("spots.json"));
     b.simulate("--out ./spots --scene here.toml --set surface --poses spots.json");
     let ranged: Value = serde_json::from_str(&b.run(&format!("{find} --range spots/surface"))).unwrap();
@@ -239,8 +252,8 @@ fn a_second_look_is_planned_taken_and_brought_together() {
     refused("scans/a scans/moved", 1, &["looks' ratio"]);
     assert!(json(&b.at("no.json"))["poses"].is_null());
 
-    // The hand-eye is 1 mm off along the stripe (along the way a delay would do the same): each look passes, both together do
-    // not, and it is named among what explains it.
+    // The hand-eye is 1 mm off along the stripe (along the way a delay would do the same): each look passes, both
+    // together do not, and it is named among what explains it.
     let mut rig = Rig::load(&b.at("station")).unwrap();
     rig.hand_eye.as_mut().unwrap().value.translation.y += 1.0;
     rig.store_all(&b.at("station")).unwrap();

@@ -1,5 +1,6 @@
-//! In: simulated parts on a linear axis and a turntable, and under a robot, seen by a running camera; a board that rides past it. Out: whether
-//! each picture is paired with where things truly stood, and scans are as accurate as the robot's, with the true axis and a calibrated one.
+//! In: simulated parts on a linear axis and a turntable, and under a robot, seen by a running camera; a board that
+//! rides past it. Out: whether each picture is paired with where things truly stood, and scans are as accurate as the
+//! robot's, with the true axis and a calibrated one.
 //! Frame and unit: mm; counts.
 
 use super::{json, text};
@@ -19,8 +20,8 @@ const SCENE: &str = "name = 'wedges'\nregion_mm = [-15, -9, 15, 9]\n\
     [[solid]]\nshape = { wedge = { size_mm = [12, 12, 9], drop_mm = 7 } }\nat_mm = [-6, 0, 7]\nturn_deg = 70\n\
     [[solid]]\nshape = { wedge = { size_mm = [12, 12, 9], drop_mm = 7 } }\nat_mm = [7, 0, 7]\nturn_deg = 250\n";
 
-/// Middle, turn and half a side of the plate and the wedges. The figures are of what lies this far from their edges: there half of a stripe is on
-/// another face, and how many pictures fall there is chance.
+/// Middle, turn and half a side of the plate and the wedges. The figures are of what lies this far from their edges:
+/// there half of a stripe is on another face, and how many pictures fall there is chance.
 const BLOCKS: [([f64; 2], f64, f64); 3] = [([0.0, 0.0], 0.0, 30.0), ([-6.0, 0.0], 70.0, 6.0), ([7.0, 0.0], 250.0, 6.0)];
 const APART: f64 = 0.8;
 /// The plate's corners from a turntable's axis, mm.
@@ -114,7 +115,8 @@ impl Live<'_> {
         let off = self.off(&camera, &kept);
         let found = Found { faces: usual(&distances), points: points.len(), off };
         println!(
-            "{} live, {out}: {:.4} mm on {} points of faces, {all:.4} mm on all {}; pairing off by {:.4} mm rms, {:.4} at most; {account}",
+            "{} live, {out}: {:.4} mm on {} points of faces, {all:.4} mm on all {}; pairing off by {:.4} mm rms, \
+             {:.4} at most; {account}",
             self.motion,
             found.faces,
             distances.len(),
@@ -197,8 +199,8 @@ fn camera_from_axis(axis: &Value) -> Rigid<Camera, Base> {
     Rigid::from_rows(&m).unwrap().0
 }
 
-/// Of the direction, along the angle that is known worst, as stated, rad: a carriage that rides over a long board tells one of the two
-/// far better than the other.
+/// Of the direction, along the angle that is known worst, as stated, rad: a carriage that rides over a long board
+/// tells one of the two far better than the other.
 fn direction_sigma(axis: &Value) -> f64 {
     let of = &axis["covariance"];
     let at =
@@ -214,8 +216,9 @@ fn usual(of: &[f64]) -> f64 {
     1.4826 * sizes[sizes.len() / 2]
 }
 
-/// Time errors, not counts: a millisecond at 20 mm/s. Poses come every few milliseconds, or every 20 on a loaded machine; where it turns back
-/// a straight way between two of them is off by an eighth of the acceleration (200 mm/s2) times their distance squared.
+/// Time errors, not counts: a millisecond at 20 mm/s. Poses come every few milliseconds, or every 20 on a loaded
+/// machine; where it turns back a straight way between two of them is off by an eighth of the acceleration (200
+/// mm/s2) times their distance squared.
 const PAIRED: f64 = 0.02;
 
 /// Short: the linear axis. `SHEETLIGHT_LONG`: the turntable too.
@@ -227,12 +230,13 @@ fn an_axis_before_a_running_camera_scans_as_accurately_as_a_robot() {
     let robot = live("robot");
     robot.simulate("2");
     let want = robot.scan("out", "20", "65", None);
-    // Two draws, of different moments: an axis' is 1.04 of the robot's with a deviation of 0.026, so that one in a hundred thousand is
-    // beyond by chance.
+    // Two draws, of different moments: an axis' is 1.04 of the robot's with a deviation of 0.026, so that one in a
+    // hundred thousand is beyond by chance.
     let judge = |is: &Found, what: &str| {
         assert!(is.faces < 1.15 * want.faces, "{what}: {:.4} mm, {:.4} robot", is.faces, want.faces);
     };
-    // A direction is known well once the board has gone far, or round (which `calibrate axis` advises where it has not).
+    // A direction is known well once the board has gone far, or round (which `calibrate axis` advises where it has
+    // not).
     let axes = [("linear", "20", "12", "65"), ("turntable", "100", "110", "100")];
     let long = std::env::var("SHEETLIGHT_LONG").is_ok();
     for (motion, speed, past, shots) in &axes[..if long { 2 } else { 1 }] {
@@ -246,7 +250,8 @@ fn an_axis_before_a_running_camera_scans_as_accurately_as_a_robot() {
         let sigma = direction_sigma(&found).to_degrees();
         let [pitch, true_pitch] = [&found, &truth].map(|c| c["value"]["pitch"].as_f64().unwrap());
         println!(
-            "{motion}, calibrated from pictures of a board that rode past: {}, direction {turned:.4} degrees off ({sigma:.4} stated), pitch by {:.2e} of it",
+            "{motion}, calibrated from pictures of a board that rode past: {}, direction {turned:.4} degrees off \
+             ({sigma:.4} stated), pitch by {:.2e} of it",
             found["quality"]["verdict"],
             pitch / true_pitch - 1.0
         );
@@ -255,7 +260,8 @@ fn an_axis_before_a_running_camera_scans_as_accurately_as_a_robot() {
         assert!(turned < 0.1 && (pitch / true_pitch - 1.0).abs() < 1e-3, "{found}");
         assert!(["good", "usable"].contains(&found["quality"]["verdict"].as_str().unwrap()), "{}", found["quality"]);
         assert!(found["covariance"]["matrix"].as_array().is_some_and(|v| !v.is_empty()), "{}", found["covariance"]);
-        // A calibrated axis' frame is put beside the one before as well as its direction is known; where a part stands in it has no truth.
+        // A calibrated axis' frame is put beside the one before as well as its direction is known; where a part
+        // stands in it has no truth.
         let own = camera_from_axis(&truth).inverse() * camera_from_axis(&found);
         judge(&axis.scan("own", speed, shots, Some(own)), "calibrated axis");
     }

@@ -1,5 +1,5 @@
-//! In: a server that speaks the cell's protocol, cut off in the middle of a picture and started again. Out: its pictures as they are, its clock, its
-//! features, its refusals; an account without a rest.
+//! In: a server that speaks the cell's protocol, cut off in the middle of a picture and started again. Out: its
+//! pictures as they are, its clock, its features, its refusals; an account without a rest.
 //! Frame and unit: pictures, ns.
 
 use sheetlight::capture::wire::{Message, Sent, write};

@@ -1,5 +1,5 @@
-//! In: pictures. Out: a GigE Vision camera on a loopback address that sends them: GVCP on UDP port 3956, GVSP to whom the stream channel
-//! names, lost packets on request; test equipment, written after the standard's registers.
+//! In: pictures. Out: a GigE Vision camera on a loopback address that sends them: GVCP on UDP port 3956, GVSP to whom
+//! the stream channel names, lost packets on request; test equipment, written after the standard's registers.
 //! Frame and unit: big endian on the wire; times in ns.
 
 use sheetlight::raster::{Image, Pixels};
@@ -163,7 +163,9 @@ fn registers(ip: Ipv4Addr, picture: &Image, deep: bool) -> Registers {
 fn xml() -> String {
     let reg = |name: &str, at: u32, mode: &str| {
         format!(
-            "<IntReg Name=\"{name}Reg\"><Address>0x{at:x}</Address><Length>4</Length><AccessMode>{mode}</AccessMode><pPort>Device</pPort><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>"
+            "<IntReg \
+             Name=\"{name}Reg\"><Address>0x{at:x}</Address><Length>4</Length><AccessMode>{mode}</AccessMode>\
+             <pPort>Device</pPort><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>"
         )
     };
     let integer = |name: &str, at: u32| {
@@ -193,22 +195,42 @@ fn xml() -> String {
         integer("Width", WIDTH),
         integer("Height", HEIGHT),
         integer("PayloadSize", PAYLOAD),
-        format!("<Enumeration Name=\"PixelFormat\"><EnumEntry Name=\"Mono8\"><Value>{MONO8}</Value></EnumEntry><EnumEntry Name=\"BayerRG8\"><Value>{BAYER}</Value></EnumEntry><EnumEntry Name=\"Mono12\"><Value>{MONO12}</Value></EnumEntry><pValue>PixelFormatReg</pValue></Enumeration>"),
+        format!(
+            "<Enumeration Name=\"PixelFormat\"><EnumEntry \
+                 Name=\"Mono8\"><Value>{MONO8}</Value></EnumEntry><EnumEntry \
+                 Name=\"BayerRG8\"><Value>{BAYER}</Value></EnumEntry><EnumEntry \
+                 Name=\"Mono12\"><Value>{MONO12}</Value></EnumEntry><pValue>PixelFormatReg</pValue></Enumeration>"
+        ),
         reg("PixelFormat", FORMAT, "RW"),
         reg("Acquisition", START, "RW"),
         command("AcquisitionStart", "AcquisitionReg", 1),
         command("AcquisitionStop", "AcquisitionReg", 0),
-        "<Float Name=\"ExposureTime\"><pValue>ExposureTimeReg</pValue><Min>10</Min><Max>1000000</Max><Unit>us</Unit></Float>".into(),
-        format!("<FloatReg Name=\"ExposureTimeReg\"><Address>0x{EXPOSURE:x}</Address><Length>4</Length><AccessMode>RW</AccessMode><pPort>Device</pPort><Endianess>BigEndian</Endianess></FloatReg>"),
+        "<Float \
+         Name=\"ExposureTime\"><pValue>ExposureTimeReg</pValue><Min>10</Min><Max>1000000</Max><Unit>us</Unit>\
+         </Float>"
+            .into(),
+        format!(
+            "<FloatReg \
+                 Name=\"ExposureTimeReg\"><Address>0x{EXPOSURE:x}</Address><Length>4</Length>\
+                 <AccessMode>RW</AccessMode><pPort>Device</pPort><Endianess>BigEndian</Endianess></FloatReg>"
+        ),
         integer("GevTimestampTickFrequency", 0x940),
         reg("Latch", LATCH, "WO"),
         command("GevTimestampControlLatch", "LatchReg", 2),
         "<Integer Name=\"GevTimestampValue\"><pValue>GevTimestampValueReg</pValue></Integer>".into(),
-        "<IntReg Name=\"GevTimestampValueReg\"><Address>0x948</Address><Length>8</Length><AccessMode>RO</AccessMode><pPort>Device</pPort><Cachable>NoCache</Cachable><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>".into(),
+        "<IntReg \
+         Name=\"GevTimestampValueReg\"><Address>0x948</Address><Length>8</Length><AccessMode>RO</AccessMode>\
+         <pPort>Device</pPort><Cachable>NoCache</Cachable><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess>\
+         </IntReg>"
+            .into(),
         "<Port Name=\"Device\"></Port>".into(),
     ];
     format!(
-        "<?xml version=\"1.0\" encoding=\"utf-8\"?><RegisterDescription ModelName=\"Test\" VendorName=\"Sheetlight\" StandardNameSpace=\"GEV\" SchemaMajorVersion=\"1\" SchemaMinorVersion=\"1\" SchemaSubMinorVersion=\"0\" MajorVersion=\"1\" MinorVersion=\"0\" SubMinorVersion=\"0\" ToolTip=\"\" ProductGuid=\"11111111-1111-1111-1111-111111111111\" VersionGuid=\"11111111-1111-1111-1111-111111111112\" xmlns=\"http://www.genicam.org/GenApi/Version_1_1\">{}</RegisterDescription>",
+        "<?xml version=\"1.0\" encoding=\"utf-8\"?><RegisterDescription ModelName=\"Test\" VendorName=\"Sheetlight\" \
+         StandardNameSpace=\"GEV\" SchemaMajorVersion=\"1\" SchemaMinorVersion=\"1\" SchemaSubMinorVersion=\"0\" \
+         MajorVersion=\"1\" MinorVersion=\"0\" SubMinorVersion=\"0\" ToolTip=\"\" \
+         ProductGuid=\"11111111-1111-1111-1111-111111111111\" VersionGuid=\"11111111-1111-1111-1111-111111111112\" \
+         xmlns=\"http://www.genicam.org/GenApi/Version_1_1\">{}</RegisterDescription>",
         body.concat()
     )
 }
@@ -349,7 +371,8 @@ fn stream(
         }
         let due = *next.get_or_insert_with(Instant::now);
         std::thread::sleep(due.saturating_duration_since(Instant::now()));
-        // A camera does not stand still with the machine that plays it: what it did not take in time it takes later, never at once.
+        // A camera does not stand still with the machine that plays it: what it did not take in time it takes later,
+        // never at once.
         next = Some((due + period).max(Instant::now()));
         taken.store(done + 1, Ordering::Relaxed);
         if faults.skips > 0 && done % faults.skips == faults.skips - 1 {

@@ -1,5 +1,5 @@
-//! In: a test device and the aravis fake camera on loopback. Out: whether every picture that was taken is received as it is or accounted
-//! for, with packets lost, the cable pulled, and a second program asking for the camera.
+//! In: a test device and the aravis fake camera on loopback. Out: whether every picture that was taken is received as
+//! it is or accounted for, with packets lost, the cable pulled, and a second program asking for the camera.
 //! Frame and unit: pictures, packets.
 
 use super::device::{Device, Faults};
@@ -18,8 +18,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
-/// A camera that does not answer within half a second is taken for none, and pictures that nobody takes from the network for a third of
-/// one are lost: a machine that stands still for so long spoils a trial.
+/// A camera that does not answer within half a second is taken for none, and pictures that nobody takes from the
+/// network for a third of one are lost: a machine that stands still for so long spoils a trial.
 const TRIES: usize = 8;
 
 fn pictures() -> Vec<Image> {
@@ -44,7 +44,8 @@ fn run(args: &[&str]) -> Result<String, String> {
     if done.status.success() { Ok(said) } else { Err(said) }
 }
 
-/// Receives until it is enough, looks at each picture, gives the account. `enough` is told for how long nothing has come.
+/// Receives until it is enough, looks at each picture, gives the account. `enough` is told for how long nothing has
+/// come.
 fn receive(
     uri: &str,
     enough: impl Fn(&Account, Duration) -> bool,
@@ -151,7 +152,8 @@ fn numbers_that_begin_anew_after_sixteen_bits_go_on() {
     });
 }
 
-/// Pictures carry the device's time, which jumps by 120 ms after forty: those around it have no pose, all others the right one.
+/// Pictures carry the device's time, which jumps by 120 ms after forty: those around it have no pose, all others the
+/// right one.
 #[test]
 fn a_clock_that_jumps_costs_what_came_around_it_and_pairs_nothing_wrongly() {
     const SPEED: f64 = 200.0;
@@ -184,7 +186,8 @@ fn a_clock_that_jumps_costs_what_came_around_it_and_pairs_nothing_wrongly() {
                     stream.fate(Fate::Used);
                     heard = Instant::now();
                     let Some(Stand::Robot(pose)) = shot.stand else { panic!("no pose") };
-                    // It comes after it was taken, how long after is the machine's load: a pose of after it came is of a wrong time.
+                    // It comes after it was taken, how long after is the machine's load: a pose of after it came is
+                    // of a wrong time.
                     ahead = ahead.max((pose.translation.x - at(shot.picture.host_ns)) / SPEED);
                     unsure_ns = unsure_ns.max(shot.taken.time_sigma_ns.unwrap());
                 }
@@ -194,7 +197,8 @@ fn a_clock_that_jumps_costs_what_came_around_it_and_pairs_nothing_wrongly() {
         }
         let a = stream.account();
         let told = format!(
-            "a clock that jumps by 120 ms: {a}; poses at most {:.1} ms after a picture came, times to {:.2} ms, {said:?}",
+            "a clock that jumps by 120 ms: {a}; poses at most {:.1} ms after a picture came, times to {:.2} ms, \
+             {said:?}",
             1e3 * ahead,
             1e-6 * unsure_ns
         );
@@ -308,7 +312,7 @@ fn after_an_outage_no_picture_is_paired_by_number_with_a_pose_of_before() {
         assert!(used.iter().all(|(id, stand)| *stand == Some(at(id - first))), "{used:?}");
         let rising = used.windows(2).all(|w| w[0].0 < w[1].0);
         assert!(rising && used.iter().all(|(id, _)| *id <= left), "{used:?}");
-        let told = said.iter().any(|s| s.contains("are left out")) && stream.left_out()[0].why.contains("was gone");
+        let told = said.iter().any(|s| s.contains("are excluded")) && stream.left_out()[0].why.contains("was gone");
         judged((), told && a.outages == 1 && a.unpaired >= BEFORE, format!("{a} {said:?}"))
     });
 }

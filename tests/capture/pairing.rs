@@ -1,5 +1,6 @@
-//! In: pictures of a part that is passed to and fro, their times late by a known delay; streams of poses with gaps, jumps, clocks that run
-//! backwards and wrong units. Out: the delay found, the cloud as good as the still one; shots left out and listed, never extrapolated.
+//! In: pictures of a part that is passed to and fro, their times late by a known delay; streams of poses with gaps,
+//! jumps, clocks that run backwards and wrong units. Out: the delay found, the cloud as good as the still one;
+//! excluded shots listed, never extrapolated.
 //! Frame and unit: base frame, mm; ms.
 
 use super::{json, scan_folder, text};
@@ -316,7 +317,7 @@ fn after_an_outage_numbers_pair_nothing_and_a_counter_only_where_it_had_power() 
             };
             assert_eq!(stand, want, "{table:?}, picture {k}");
         }
-        let left = said.iter().filter(|s| s.contains("are left out")).count();
+        let left = said.iter().filter(|s| s.contains("are excluded")).count();
         assert_eq!(left, usize::from(used < 10), "{table:?}: {said:?}");
     }
 }

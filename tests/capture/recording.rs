@@ -1,5 +1,5 @@
-//! In: a recording that is played as a camera. Out: the same pictures and the same cloud after recording, scanning while recording and
-//! scanning alone; what a crash, a second recorder and a full disk leave.
+//! In: a recording that is played as a camera. Out: the same pictures and the same cloud after recording, scanning
+//! while recording and scanning alone; what a crash, a second recorder and a full disk leave.
 //! Frame and unit: bytes, pictures.
 
 use super::{cloud_of, json, scan_folder, station, text};
@@ -29,8 +29,8 @@ fn account(value: &serde_json::Value) -> Account {
     serde_json::from_value(value.clone()).unwrap()
 }
 
-/// A camera loses what a machine that stands still does not take from it: then there is less to compare, and it is tried again. What
-/// became of each is told in any case.
+/// A camera loses what a machine that stands still does not take from it: then there is less to compare, and it is
+/// tried again. What became of each is told in any case.
 fn all_used(account: &serde_json::Value) -> Result<(), String> {
     let a = self::account(account);
     assert_eq!(a.unexplained(), 0, "{a}");

@@ -1,5 +1,6 @@
-//! In: a simulated cell's robot and camera on their wires, the arm moving and resting, passing a part to and fro. Out: whether pictures that
-//! were taken while it moved are refused and those at rest paired with where it stood; the delay between camera and controller found.
+//! In: a simulated cell's robot and camera on their wires, the arm moving and resting, passing a part to and fro.
+//! Out: whether pictures that were taken while it moved are refused and those at rest paired with where it stood; the
+//! delay between camera and controller found.
 //! Frame and unit: base frame, mm; s of the cell.
 
 use super::{json, text};
@@ -129,7 +130,8 @@ fn to_and_fro() -> Result<(), String> {
     let still = |id: &&u64| way(moment(**id) - 0.1, moment(**id) + 0.05) < 1e-3;
     let wrongly = moved.iter().filter(still).count();
     println!(
-        "step: {account}; {} at rest, at most {farthest:.4} mm on the way in an exposure, {off:.3} mm from the pose; {} refused as moved, {wrongly} of them at rest",
+        "step: {account}; {} at rest, at most {farthest:.4} mm on the way in an exposure, {off:.3} mm from the pose; \
+         {} refused as moved, {wrongly} of them at rest",
         taken.len(),
         moved.len()
     );

@@ -1,4 +1,5 @@
-//! In: pipes, folders, ffmpeg, a simulated station. Out: whether their pictures come as they are, and what is said where they do not.
+//! In: pipes, folders, ffmpeg, a simulated station. Out: whether their pictures come as they are, and what is said
+//! where they do not.
 //! Frame and unit: pixels, pictures.
 
 use super::{scan_folder, text};
@@ -65,7 +66,8 @@ fn raw_frames_on_a_pipe_are_recorded_as_they_are() {
 #[test]
 fn a_folder_gives_each_picture_once_it_is_complete() {
     let sent = pictures();
-    // What is there before the folder is looked at is none of its pictures, and half a picture is waited for two seconds long.
+    // What is there before the folder is looked at is none of its pictures, and half a picture is waited for two
+    // seconds long.
     tries(5, || {
         let dir = tempfile::tempdir().unwrap();
         std::fs::write(dir.path().join("a000.png"), sheetlight::raster::png(&sent[0])).unwrap();

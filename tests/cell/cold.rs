@@ -1,5 +1,6 @@
-//! In: simulated cells of which nothing is calibrated, a board below the arm. Out: how good the calibration is that the program
-//! drives by itself over the robot's and the camera's wires, and whether parts are inserted with it; judged by the cell's truth.
+//! In: simulated cells of which nothing is calibrated, a board below the arm. Out: how good the calibration is that
+//! the program drives by itself over the robot's and the camera's wires, and whether parts are inserted with it;
+//! judged by the cell's truth.
 //! Frame and unit: base frame; mm, degrees, s.
 
 use super::speeds::{HEAD, ROOM, Speeds};
@@ -48,7 +49,8 @@ impl Cold {
         let dir = tempfile::tempdir().unwrap();
         let station = dir.path().join("station");
         let tool = Some(ToolSpec { flange_from_tool: served.cell.flange_from_tool() });
-        // Two busy cores may keep the link's threads waiting for long; that a silent link halts is shown by the rules' own test.
+        // Two busy cores may keep the link's threads waiting for long; that a silent link halts is shown by the
+        // rules' own test.
         let motion = Limits { max_silence_ms: 5000.0, max_still_ms: 5000.0, ..Limits::within(SPACE) };
         let [near_mm, far_mm] = working;
         let working_volume = Some(WorkingVolume { near_mm, far_mm });
@@ -117,9 +119,10 @@ impl Cold {
         apart(&result.joint.fit.state, &truth, &places(&truth, self.working))
     }
 
-    /// The same as the arm itself has it, which is not built as its controller believes: at poses between those of the calibration, places
-    /// beside the board as the station finds it, against where they truly lie beside it. A board, a part and the gripper that goes to it
-    /// are all off together by what the arm's first and last links are, and nobody sees that.
+    /// The same as the arm itself has it, which is not built as its controller believes: at poses between those of
+    /// the calibration, places beside the board as the station finds it, against where they truly lie beside it. A
+    /// board, a part and the gripper that goes to it are all off together by what the arm's first and last links are,
+    /// and nobody sees that.
     fn off_beside_the_board(&self, result: &AutoResult) -> f64 {
         let (station, fit) = (self.served.cell.station(), &result.joint.fit);
         let truth = State { plane: station.laser.plane(), camera: station.camera, ..fit.state.clone() };
@@ -155,8 +158,8 @@ impl Cold {
         self.served.cell.log().iter().filter(|e| out(&e.event)).count()
     }
 
-    /// Poses at which pictures with the line on were taken, and those from which the board was not seen: times the line went on and
-    /// off, at most.
+    /// Poses at which pictures with the line on were taken, and those from which the board was not seen: times the
+    /// line went on and off, at most.
     fn stood(&self) -> usize {
         let line = Outputs::default().line;
         let lit = |e: &Event| matches!(e, Event::Output { number, on: true } if *number == line);
@@ -256,7 +259,8 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// What is asked of twenty cells is asked of fewer with room for chance: four of those that hold it had 1.16 of it among themselves.
+/// What is asked of twenty cells is asked of fewer with room for chance: four of those that hold it had 1.16 of it
+/// among themselves.
 fn room(bar: f64, cells: usize) -> f64 {
     if cells < 20 { bar * (1.0 + 1.0 / (cells as f64).sqrt()) } else { bar }
 }
@@ -270,7 +274,8 @@ fn calibrated(cold: &Cold, what: &str, target_mm: f64) -> Option<(f64, f64, bool
             let off = if crooked { cold.off_beside_the_board(&result) } else { cold.off(&result) };
             let expected = result.joint.expected_mm();
             println!(
-                "{what}: {} stops, {:?}, off {off:.4} mm, expected {expected:.4}, ratio {:.2}, outside {}, refused {}, {:.0} s of the cell, {:.0} s; {:?}",
+                "{what}: {} stops, {:?}, off {off:.4} mm, expected {expected:.4}, ratio {:.2}, outside {}, refused \
+                 {}, {:.0} s of the cell, {:.0} s; {:?}",
                 result.stops,
                 result.ended,
                 off / expected,
@@ -326,7 +331,8 @@ fn cold_cells_calibrate_themselves_and_insert() {
     let (off, ratio) =
         (rms(&all.iter().map(|a| a.0).collect::<Vec<_>>()), rms(&all.iter().map(|a| a.0 / a.1).collect::<Vec<_>>()));
     println!(
-        "{} cells: points off {off:.4} mm rms, over sigma {ratio:.2}; {} inserted, aside {:.4} mm rms, worst {:.4}; wrong: {wrong:#?}",
+        "{} cells: points off {off:.4} mm rms, over sigma {ratio:.2}; {} inserted, aside {:.4} mm rms, worst {:.4}; \
+         wrong: {wrong:#?}",
         all.len(),
         aside.len(),
         rms(&aside),
@@ -384,7 +390,8 @@ fn cold_cells_of_other_kinds_calibrate_themselves() {
 #[test]
 fn a_cold_cell_calibrates_itself_over_its_wires() {
     let (calibrated, checks) = coarse(|o| o);
-    // Of five; with few pixels the stripe of one may lie on the board over less than the part that a picture needs to count.
+    // Of five; with few pixels the stripe of one may lie on the board over less than the part that a picture needs to
+    // count.
     assert!((4..=5).contains(&checks), "{checks}");
     assert!(calibrated.hand_eye.is_some() && calibrated.base_camera.is_none());
 }

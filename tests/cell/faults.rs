@@ -1,5 +1,6 @@
-//! In: jobs run as processes against simulated cells, each with one fault at a random moment. Out: whether every one ends inserted or
-//! safely stopped, and whether the arm ever made a motion that was not confirmed: the cell's own log against the log of motions.
+//! In: jobs run as processes against simulated cells, each with one fault at a random moment. Out: whether every one
+//! ends inserted or safely stopped, and whether the arm ever made a motion that was not confirmed: the cell's own log
+//! against the log of motions.
 //! Frame and unit: mm, degrees; s.
 
 use super::workplace::{DARK, Set, dark_within, scene, set};
@@ -136,7 +137,8 @@ fn begun(log: &Path) -> Vec<Vec<Rigid<Base, Flange>>> {
     lines.iter().filter(|l| l["event"] == "begun").map(|l| asked(&l["hash"])).collect()
 }
 
-/// The motions of the cell's log are the beginnings of the plans that were begun, one plan after the other, each leg at most once.
+/// The motions of the cell's log are the beginnings of the plans that were begun, one plan after the other, each leg
+/// at most once.
 fn all_confirmed(log: &[Entry], plans: &[Vec<Rigid<Base, Flange>>]) -> Result<usize, String> {
     let moves = log.iter().filter_map(|e| match &e.event {
         Event::Move { to, .. } => Some(to),

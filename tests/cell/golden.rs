@@ -1,4 +1,5 @@
-//! In: sessions captured between Denso's own client and server. Out: whether our controller answers the same requests alike.
+//! In: sessions captured between Denso's own client and server. Out: whether our controller answers the same requests
+//! alike.
 //! Frame and unit: bytes; mm, degrees.
 
 use super::{cell, common};

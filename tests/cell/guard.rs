@@ -1,5 +1,5 @@
-//! In: an arm that does what a test tells it, also what no simulated controller does. Out: whether the rules notice: what is not
-//! allowed is not asked of it, what goes wrong halts it, and what is done stands in the log first.
+//! In: an arm that does what a test tells it, also what no simulated controller does. Out: whether the rules notice:
+//! what is not allowed is not asked of it, what goes wrong halts it, and what is done stands in the log first.
 //! Frame and unit: base frame; mm.
 
 use super::workplace::bare;

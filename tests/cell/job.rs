@@ -1,5 +1,6 @@
-//! In: simulated cells with a part somewhere below the arm, a person who says yes. Out: whether the job inserts it, judged by the
-//! cell's truth; whether it keeps away from what is missing, wrong or hidden; whether it survives being cut off.
+//! In: simulated cells with a part somewhere below the arm, a person who says yes. Out: whether the job inserts it,
+//! judged by the cell's truth; whether it keeps away from what is missing, wrong or hidden; whether it survives being
+//! cut off.
 //! Frame and unit: mm, degrees, s.
 
 use super::speeds::ROOM;

@@ -1,4 +1,5 @@
-//! In: insertion poses. Out: whether the programs that are written for robots hold these poses, read back by their own rules.
+//! In: insertion poses. Out: whether the programs that are written for robots hold these poses, read back by their
+//! own rules.
 //! Frame and unit: mm, degrees.
 
 use sheetlight::geometry::{Base, Rigid, Tool, Vec3};

@@ -1,5 +1,5 @@
-//! In: the program as a person starts it, against cells in which one thing is not as it has to be. Out: whether it ends with a clear
-//! error and its exit code, and the arm has stood still.
+//! In: the program as a person starts it, against cells in which one thing is not as it has to be. Out: whether it
+//! ends with a clear error and its exit code, and the arm has stood still.
 //! Frame and unit: mm.
 
 use super::workplace::{Set, scene, set};
@@ -61,7 +61,7 @@ fn a_cell_that_is_not_ready_is_told_in_words_and_nothing_moves() {
     let shell = stranger(true, b"SSH-2.0-OpenSSH_9.6\r\n");
     refused(&format!("bcap://{shell}"), &camera, &["SSH"]);
     refused(&format!("bcap://{}", set.served.camera), &camera, &["b-CAP"]);
-    refused(&robot, &format!("cell://{}?rate=-1", set.served.robot), &["another program answers there"]);
+    refused(&robot, &format!("cell://{}?rate=-1", set.served.robot), &["another program uses that port"]);
     refused(&format!("ur://{}", set.served.robot), &camera, &["ur://"]);
     // The controller is not ready.
     let controller = &set.served.controller;

@@ -1,5 +1,5 @@
-//! In: plans of which one thing is wrong, confirmations that do not belong, links and people that go while the arm moves. Out:
-//! no motion in the controller's log, or a Halt there in time.
+//! In: plans of which one thing is wrong, confirmations that do not belong, links and people that go while the arm
+//! moves. Out: no motion in the controller's log, or a Halt there in time.
 //! Frame and unit: base frame; mm, degrees; ms.
 
 use super::cell;
@@ -16,7 +16,8 @@ use std::time::{Duration, Instant};
 
 const SPACE: Space = Space { from_mm: [150.0, -300.0, 200.0], to_mm: [500.0, 300.0, 700.0] };
 
-/// The usual limits, and the longest silence: a machine that stands still is silent too, and only one test is about silence.
+/// The usual limits, and the longest silence: a machine that stands still is silent too, and only one test is about
+/// silence.
 fn limits() -> Limits {
     Limits { max_silence_ms: 5000.0, max_still_ms: 5000.0, ..Limits::within(SPACE) }
 }
@@ -72,8 +73,8 @@ fn each_gate_that_is_broken_by_itself_moves_nothing() {
     let (none, nothing) = (|_: &mut Limits| {}, |_: &Served| {});
     let up = |p: &mut Plan| p.evidence.normal = Some(Vec3::z());
     let poses: [(&str, &dyn Fn(&mut Plan)); 11] = [
-        ("departure from a rotation", &|p| p.legs[0].to.rotation[(0, 0)] = f64::NAN),
-        ("departure from a rotation", &|p| p.legs[0].to.rotation *= 1.001),
+        ("orthonormality error of the rotation", &|p| p.legs[0].to.rotation[(0, 0)] = f64::NAN),
+        ("orthonormality error of the rotation", &|p| p.legs[0].to.rotation *= 1.001),
         ("speed, mm/s is 51.000, limit 50.000", &|p| p.legs[0].speed_mm_s = 51.0),
         ("slowest speed", &|p| p.legs[0].speed_mm_s = 0.0),
         ("slowest speed", &|p| p.legs[0].speed_mm_s = f64::NAN),
@@ -194,8 +195,9 @@ struct Stopped<'a> {
 }
 
 impl Stopped<'_> {
-    /// Stops a motion of 100 mm at 20 mm/s: how long after there was a reason the Halt was at the controller, ms of the cell, which runs in
-    /// real time. Where the machine stood still the motion may have ended, or silence may have stopped it, before anything is done to it.
+    /// Stops a motion of 100 mm at 20 mm/s: how long after there was a reason the Halt was at the controller, ms of
+    /// the cell, which runs in real time. Where the machine stood still the motion may have ended, or silence may
+    /// have stopped it, before anything is done to it.
     fn once(&self) -> Result<f64, String> {
         let served = cell(7, 1.0);
         served.controller.set_motor(true);
@@ -289,7 +291,8 @@ fn whoever_goes_while_the_arm_moves_halts_it_in_time() {
     let frozen = frozen.in_time();
     println!("halt at the controller after ms: poses that stand for 300 {frozen:.1}");
     println!(
-        "halt at the controller after ms: STOP {stop:.1}, signal {signal:.1}, lease of 100 {lease:.1}, link cut {cut:.1}, four times as fast {fast:.1}, silence of 200 {silent:.1}"
+        "halt at the controller after ms: STOP {stop:.1}, signal {signal:.1}, lease of 100 {lease:.1}, link cut \
+         {cut:.1}, four times as fast {fast:.1}, silence of 200 {silent:.1}"
     );
 }
 
@@ -312,7 +315,7 @@ fn a_controller_whose_time_is_not_ours_is_halted() {
     for stamp in stamps {
         println!("halt at the controller after {:.1} ms", usual.stamped(stamp));
     }
-    let lost = Stopped { says: "are believed", within_ms: 50.0, ..usual };
+    let lost = Stopped { says: "are accepted", within_ms: 50.0, ..usual };
     let never: [fn(&Served, &StopButton, &AtomicBool); 2] =
         [|s, _, _| s.controller.stamp_with(|_| f64::INFINITY), |s, _, _| s.controller.stamp_with(|_| 1e20)];
     for stamp in never {

@@ -1,5 +1,5 @@
-//! In: a simulated cell, lines as a controller's own program sends them. Out: whether the answers are those that docs/robots states,
-//! the poses lead to the part, and nothing that comes over the wire is left without a clear answer.
+//! In: a simulated cell, lines as a controller's own program sends them. Out: whether the answers are those that
+//! docs/robots states, the poses lead to the part, and nothing that comes over the wire is left without a clear answer.
 //! Frame and unit: mm, degrees; metres and radians where the notation is UR's.
 
 use super::workplace::{Set, scene, set};

@@ -1,4 +1,5 @@
-//! Whether anything that the flange carries ever moves faster than the station allows, by the simulated controller's own account of its joints.
+//! Whether anything that the flange carries ever moves faster than the station allows, by the simulated controller's
+//! own account of its joints.
 
 use super::workplace::bare;
 use sheetlight::arm::rules::{Carried, Confirmation, Guard, Limits, MotionLog, Plan, Space, Straight};
@@ -58,8 +59,8 @@ impl Speeds {
 
 const SPACE: Space = Space { from_mm: [150.0, -300.0, 200.0], to_mm: [500.0, 300.0, 700.0] };
 
-/// Makes one straight motion; the greatest speed of the points, and what the limits of speed and turn allow the fastest of
-/// what it carries, mm/s.
+/// Makes one straight motion; the greatest speed of the points, and what the limits of speed and turn allow the
+/// fastest of what it carries, mm/s.
 fn once(served: &Served, carried: Carried, points: Vec<Vec3>, speed_mm_s: f64, turn: Vec3, shift: Vec3) -> (f64, f64) {
     served.controller.set_motor(true);
     let limits = Limits { speed_mm_s, max_silence_ms: 5000.0, max_still_ms: 5000.0, ..Limits::within(SPACE) };

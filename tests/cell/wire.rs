@@ -1,5 +1,5 @@
-//! In: the robot link and the camera's client of the product, against the cell. Out: one motion for one order whatever the wire
-//! does, halts in time, pictures of where the arm stands.
+//! In: the robot link and the camera's client of the product, against the cell. Out: one motion for one order
+//! whatever the wire does, halts in time, pictures of where the arm stands.
 //! Frame and unit: mm, degrees; ms.
 
 use super::cell;
@@ -85,8 +85,8 @@ fn the_link_reads_asks_and_gets_through_what_a_wire_does() {
     assert_eq!(arm.state().unwrap().errors[0].code, 0x8320_4072);
 }
 
-/// Halts a motion of 80 mm at 40 mm/s on its way; when the Halt was at the controller and how far the arm went from then, ms and mm of a
-/// cell in real time.
+/// Halts a motion of 80 mm at 40 mm/s on its way; when the Halt was at the controller and how far the arm went from
+/// then, ms and mm of a cell in real time.
 fn halted() -> Result<[f64; 2], String> {
     let served = cell(1, 1.0);
     let uri = served.robot_uri();

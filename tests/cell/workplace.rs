@@ -1,5 +1,5 @@
-//! In: a simulated cell with a part somewhere below the arm. Out: its station folder, a robot behind its rules, a person who says yes:
-//! what every test of a job begins with.
+//! In: a simulated cell with a part somewhere below the arm. Out: its station folder, a robot behind its rules, a
+//! person who says yes: what every test of a job begins with.
 //! Frame and unit: mm, degrees.
 
 use super::speeds::{HEAD, Speeds};
@@ -98,7 +98,8 @@ pub fn set_but(mut spec: SceneSpec, seed: u64, tilt_deg: f64, but: impl FnOnce(&
     served.cell.station().store(&station).unwrap();
     let workspace = Space { from_mm: [150.0, -300.0, 250.0], to_mm: [600.0, 300.0, 700.0] };
     let tool = Some(ToolSpec { flange_from_tool: served.cell.flange_from_tool() });
-    // Two busy cores may keep the link's threads waiting for long; that a silent link halts is shown by the rules' own test.
+    // Two busy cores may keep the link's threads waiting for long; that a silent link halts is shown by the rules'
+    // own test.
     let motion = Limits { max_silence_ms: 5000.0, max_still_ms: 5000.0, ..Limits::within(workspace) };
     let head = Some(HeadSpec { points_mm: vec![HEAD] });
     Settings { motion: Some(motion), tool, head, ..Settings::default() }.store(&station).unwrap();

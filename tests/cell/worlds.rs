@@ -1,5 +1,5 @@
-//! In: simulated cells in which something else lies than the recipe says, or in which a light does not follow its output. Out:
-//! whether the job keeps away from it, and says why with numbers.
+//! In: simulated cells in which something else lies than the recipe says, or in which a light does not follow its
+//! output. Out: whether the job keeps away from it, and says why with numbers.
 //! Frame and unit: mm, degrees.
 
 use super::workplace::{Set, Yes, scene, set_but};

@@ -1,9 +1,11 @@
-//! In: two clouds of the same pictures and station. Out: how far their points are apart, and points that only one of them has.
+//! In: two clouds of the same pictures and station. Out: how far their points are apart, and points that only one of
+//! them has.
 //! Frame and unit: mm; places in the pictures in px.
 
 use sheetlight::scan::CloudPoint;
 
-/// Points whose centres are nearer than this, px, are of the same skeleton pixel or of its neighbour on the same stripe.
+/// Points whose centres are nearer than this, px, are of the same skeleton pixel or of its neighbour on the same
+/// stripe.
 const SAME_PX: f32 = 0.05;
 /// So many points in a row may be in one cloud only before the clouds are taken for different ones there.
 const AHEAD: usize = 40;
@@ -19,8 +21,8 @@ pub struct Apart {
     pub equal: usize,
 }
 
-/// Both clouds are in the order of shots and of skeleton pixels, so that partners come in the same order: several pixels of a
-/// skeleton may have the same centre, and a search by place would mix them up.
+/// Both clouds are in the order of shots and of skeleton pixels, so that partners come in the same order: several
+/// pixels of a skeleton may have the same centre, and a search by place would mix them up.
 pub fn apart(a: &[CloudPoint], b: &[CloudPoint]) -> Apart {
     let same = |p: &CloudPoint, q: &CloudPoint| p.shot == q.shot && (p.u - q.u).hypot(p.v - q.v) < SAME_PX;
     let mut out = Apart::default();

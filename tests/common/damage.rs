@@ -1,5 +1,5 @@
-//! In: valid bytes of a format, its reader. Out: a failure where damaged ones make it panic, hang, eat memory, or fault without a
-//! next step; what failed is kept, and read first the next time (tests/corpus).
+//! In: valid bytes of a format, its reader. Out: a failure where damaged ones make it panic, hang, eat memory, or
+//! fault without a next step; what failed is kept, and read first the next time (tests/corpus).
 //! Frame and unit: s, MiB.
 
 #[path = "process.rs"]
@@ -40,7 +40,8 @@ const NUMBERS: [&str; 20] = [
     "0.000000001",
 ];
 
-/// One to five edits: bytes cut, changed, doubled, put in; numbers made extreme; lines gone, doubled or from another file.
+/// One to five edits: bytes cut, changed, doubled, put in; numbers made extreme; lines gone, doubled or from another
+/// file.
 fn damaged(seeds: &[Vec<u8>], rng: &mut Pcg64) -> Vec<u8> {
     let mut bytes = seeds.choose(rng).expect("a seed").clone();
     for _ in 0..rng.random_range(1..6) {

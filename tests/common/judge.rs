@@ -26,8 +26,8 @@ pub fn between(rng: &mut Pcg64, low: f64, high: f64) -> f64 {
     low + (high - low) * rng.random::<f64>()
 }
 
-/// What residuals, each in units of its sigma, say of the first `shared` of their N numbers with the others free: the inverse of their
-/// covariance. Derivatives by differences over `step` of each number, the others eliminated.
+/// What residuals, each in units of its sigma, say of the first `shared` of their N numbers with the others free: the
+/// inverse of their covariance. Derivatives by differences over `step` of each number, the others eliminated.
 pub fn information<const N: usize>(
     residuals: impl Fn(&[f64; N]) -> DVector<f64>,
     step: impl Fn(usize) -> f64,

@@ -1,5 +1,5 @@
-//! In: a measured pose of a part and its true one. Out: what they differ by. Frame and unit: the true part's own axes; mm,
-//! degrees.
+//! In: a measured pose of a part and its true one. Out: what they differ by. Frame and unit: the true part's own
+//! axes; mm, degrees.
 
 use sheetlight::geometry::{Base, Part, Rigid, Vec3};
 use std::path::Path;

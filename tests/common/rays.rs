@@ -4,8 +4,8 @@
 use sheetlight::camera::Intrinsics;
 use sheetlight::geometry::{Mat3, Vec2, Vec3, orthonormalise};
 
-/// Rms displacement of viewing rays over the image, px. Where the true camera has no ray there is none to miss; where only the
-/// found one has none it is off by `LOST`.
+/// Rms displacement of viewing rays over the image, px. Where the true camera has no ray there is none to miss; where
+/// only the found one has none it is off by `LOST`.
 pub fn ray_error(found: &Intrinsics, truth: &Intrinsics) -> f64 {
     const LOST: f64 = 10.0;
     let (mut pairs, mut lost) = (Vec::new(), 0usize);

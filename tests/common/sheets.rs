@@ -1,5 +1,6 @@
-//! In: a seed. Out: stations from the whole space of rigs with a laser sheet (depth, view, stripe's direction, laser's side
-//! and angle, boards) and their calibration pictures as board poses and stripe peaks, sound or with one fault.
+//! In: a seed. Out: stations from the whole space of rigs with a laser sheet (depth, view, stripe's direction,
+//! laser's side and angle, boards) and their calibration pictures as board poses and stripe peaks, sound or with one
+//! fault.
 //! Frame and unit: camera frame, mm, px.
 
 use super::judge::{between, gauss, gauss2};

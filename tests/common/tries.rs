@@ -1,5 +1,5 @@
-//! In: a trial whose outcome the clock decides. Out: what came of the first that this machine did not spoil: a core that was given to others
-//! is not ours to answer for.
+//! In: a trial whose outcome the clock decides. Out: what came of the first that this machine did not spoil: a core
+//! that was given to others is not ours to answer for.
 //! Frame and unit: times of this machine.
 
 use super::stall::longest_stall;
@@ -8,8 +8,8 @@ use std::time::Duration;
 /// A machine with nothing else to do wakes who sleeps sooner than this.
 const STALL: Duration = Duration::from_millis(5);
 
-/// Tries at most so often, again only where the machine kept a thread waiting in the meantime. `Err` is for what that can bring about, and
-/// says what; what is wrong however long the machine takes has to panic within the trial.
+/// Tries at most so often, again only where the machine kept a thread waiting in the meantime. `Err` is for what that
+/// can bring about, and says what; what is wrong however long the machine takes has to panic within the trial.
 pub fn tries<T>(most: usize, trial: impl Fn() -> Result<T, String>) -> T {
     let mut spoilt = Vec::new();
     loop {

@@ -1,6 +1,7 @@
-//! In: a recording and its true calibration. Out: both as they would be of a camera that is turned about its axis by quarter
-//! turns, or of a mirrored world: the scene, its light and its noise are exactly the same.
-//! Frame and unit: pixels, mm. A camera's x' = A x; where A mirrors, the base's x' = M x does as well, so that poses stay proper.
+//! In: a recording and its true calibration. Out: both as they would be of a camera that is turned about its axis by
+//! quarter turns, or of a mirrored world: the scene, its light and its noise are exactly the same.
+//! Frame and unit: pixels, mm. A camera's x' = A x; where A mirrors, the base's x' = M x does as well, so that poses
+//! stay proper.
 
 use serde_json::{Value, json};
 use sheetlight::geometry::Mat3;

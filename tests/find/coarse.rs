@@ -1,5 +1,5 @@
-//! In: pictures and height maps with a part among noise. Out: the coarse search gives the same matches, to the last bit,
-//! whether its sums come from the CPU or from the WGSL stages. Frame and unit: pixels.
+//! In: pictures and height maps with a part among noise. Out: the coarse search gives the same matches, to the last
+//! bit, whether its sums come from the CPU or from the WGSL stages. Frame and unit: pixels.
 
 use crate::common;
 use rand::{Rng, SeedableRng};

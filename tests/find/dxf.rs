@@ -1,5 +1,5 @@
-//! In: DXF drawings written here, good ones and broken ones. Out: judgement on what is read of them: the edges of the shipped
-//! recipes, units, blocks, and a refusal with its reason for everything else.
+//! In: DXF drawings written here, good ones and broken ones. Out: judgement on what is read of them: the edges of the
+//! shipped recipes, units, blocks, and a refusal with its reason for everything else.
 //! Frame and unit: part frame, mm.
 
 use crate::common;
@@ -78,7 +78,8 @@ fn oscillator() -> String {
         if back { line(b, a) } else { line(a, b) }
     };
     let outline: String = [(3, false), (0, true), (2, true), (4, false), (1, true)].map(|(i, b)| side(i, b)).concat();
-    let window = entity!("LWPOLYLINE", 8: "window", 90: 4, 70: 1, 10: -5.2, 20: -2.2, 10: 5.2, 20: -2.2, 10: 5.2, 20: 2.2,
+    let window = entity!("LWPOLYLINE", 8: "window", 90: 4, 70: 1, 10: -5.2, 20: -2.2, 10: 5.2, 20: -2.2, 10: 5.2,
+        20: 2.2,
         10: -5.2, 20: 2.2);
     let block = entity!("BLOCK", 8: "0", 2: "PINS", 70: 0, 10: 100.0, 20: 50.0, 30: 0.0)
         + &circle("pin", 100.0, 50.0, 0.72)
@@ -126,7 +127,8 @@ fn bulges_arcs_ellipses_and_both_polylines_draw_the_same_slot() {
         + &entity!("SEQEND", 8: "0");
     let bows = line([-6.0, -4.0], [6.0, -4.0])
         + &line([-6.0, 4.0], [6.0, 4.0])
-        + &entity!("ELLIPSE", 8: "0", 10: 6, 20: 0, 11: 4, 21: 0, 40: 1, 41: -std::f64::consts::FRAC_PI_2, 42: std::f64::consts::FRAC_PI_2)
+        + &entity!("ELLIPSE", 8: "0", 10: 6, 20: 0, 11: 4, 21: 0, 40: 1, 41: -std::f64::consts::FRAC_PI_2,
+            42: std::f64::consts::FRAC_PI_2)
         // Seen from below: the x axis of an arc's plane points the other way.
         + &entity!("ARC", 8: "0", 10: 6, 20: 0, 40: 4, 50: 270, 51: 90, 230: -1);
     let wanted = imported(&file(MM, "", &arcs)).drawing;
@@ -198,15 +200,18 @@ fn what_cannot_be_read_is_refused_with_its_reason() {
     let selfish = entity!("BLOCK", 8: "0", 2: "A", 10: 0, 20: 0) + &insert("A") + &entity!("ENDBLK", 8: "0");
     // Points that the curve passes, and no more.
     let spline = entity!("SPLINE", 8: "free", 70: 8, 71: 3, 74: 2, 11: 0, 21: 0, 11: 5, 21: 5);
-    let knots = |last: i32| entity!("SPLINE", 8: "0", 70: 8, 71: 1, 72: 4, 73: 2, 40: 0, 40: 0, 40: 1, 40: last, 10: 0, 20: 0, 10: 5, 20: 5);
+    let knots = |last: i32| {
+        entity!("SPLINE", 8: "0", 70: 8, 71: 1, 72: 4, 73: 2, 40: 0, 40: 0, 40: 1, 40: last,
+        10: 0, 20: 0, 10: 5, 20: 5)
+    };
     let elsewhere = entity!("BLOCK", 8: "0", 2: "X", 70: 4, 10: 0, 20: 0, 1: "other.dwg") + &entity!("ENDBLK", 8: "0");
     let plain = entity!("BLOCK", 8: "0", 2: "P", 70: 0, 10: 0, 20: 0) + &ring + &entity!("ENDBLK", 8: "0");
     let cases = [
         (file(MM, &selfish, &insert("A")), "in itself"),
-        (file(MM, "", &insert("B")), "no block"),
+        (file(MM, "", &insert("B")), "not a block"),
         (file(MM, "", &(ring.clone() + &spline)), "1 SPLINE of fit points"),
         (file(MM, "", &knots(0)), "do not rise"),
-        (file(MM, "", &knots(1).replacen("40\n0\n", "", 1)), "3 knots, wanted above 1 points and 4 knots"),
+        (file(MM, "", &knots(1).replacen("40\n0\n", "", 1)), "3 knots; allowed: above 1 points and 4 knots"),
         (file(MM, "", &(ring.clone() + &entity!("SOLID", 8: "0", 10: 0, 20: 0))), "1 SOLID"),
         (file(MM, &elsewhere, &insert("X")), "another file"),
         (file(MM, &plain, &(insert("P") + "41\n0\n")), "scaled by 0"),
@@ -215,7 +220,7 @@ fn what_cannot_be_read_is_refused_with_its_reason() {
         (file(MM, "", &entity!("CIRCLE", 8: "0", 10: 0, 20: 0, 40: 5, 210: 0.6, 230: 0.8)), "normal"),
         (file(MM, "", &entity!("LINE", 8: "0", 10: 0, 20: 0, 30: 0, 11: 1, 21: 0, 31: 7)), "rises"),
         (file(MM, "", &entity!("CIRCLE", 8: "0", 10: "nan", 20: 0, 40: 5)), "no usable number"),
-        (file(MM, "", &entity!("INSERT", 8: "0", 2: "A", 10: 0, 20: 0, 70: 30000, 71: 30000)), "no block"),
+        (file(MM, "", &entity!("INSERT", 8: "0", 2: "A", 10: 0, 20: 0, 70: 30000, 71: 30000)), "not a block"),
         (file(MM, "", &entity!("LWPOLYLINE", 8: "0", 90: 9, 70: 1, 10: 0, 20: 0)), "9 are announced"),
         (file(MM, "", &ring).replace("0\nEOF\n", ""), "cut off"),
         (file(MM, "", &ring)[..200].to_owned(), "cut off"),
@@ -251,7 +256,8 @@ fn spline_circle(x: f64, y: f64, r: f64) -> String {
 fn splines_are_read_within_two_micrometres() {
     // A cubic Bezier curve as a cap on a rectangle, with a knot inserted in its middle.
     let cap = entity!("SPLINE", 8: "0", 210: 0, 220: 0, 230: 1, 70: 8, 71: 3, 72: 9, 73: 5, 40: 0, 40: 0, 40: 0, 40: 0,
-        40: 0.5, 40: 1, 40: 1, 40: 1, 40: 1, 10: 10, 20: 0, 10: 10, 20: 6, 10: 0, 20: 12, 10: -10, 20: 6, 10: -10, 20: 0);
+        40: 0.5, 40: 1, 40: 1, 40: 1, 40: 1, 10: 10, 20: 0, 10: 10, 20: 6, 10: 0, 20: 12, 10: -10, 20: 6, 10: -10,
+            20: 0);
     let sides =
         line([-10.0, 0.0], [-10.0, -5.0]) + &line([-10.0, -5.0], [10.0, -5.0]) + &line([10.0, -5.0], [10.0, 0.0]);
     let drawing = imported(&file(MM, "", &(cap + &sides))).drawing;
@@ -399,15 +405,15 @@ fn blocks_are_turned_mirrored_and_arrayed_in_one_another() {
     let block = |name: &str, x: f64, inside: &str| {
         entity!("BLOCK", 8: "0", 2: name, 70: 0, 10: x, 20: 0) + inside + &entity!("ENDBLK", 8: "0")
     };
-    // A hole 1 right and 2 up of the base point; in an array turned by 90 degrees and scaled by 2 and -2; in a block seen
-    // from below.
+    // A hole 1 right and 2 up of the base point; in an array turned by 90 degrees and scaled by 2 and -2; in a block
+    // seen from below.
     let array =
         entity!("INSERT", 8: "0", 2: "HOLE", 10: 10, 20: 20, 41: 2, 42: -2, 43: 0, 50: 90, 70: 2, 71: 1, 44: 30);
     let blocks = block("HOLE", 7.0, &circle("0", 8.0, 2.0, 0.25)) + &block("ROW", 0.0, &array);
     let from_below = entity!("INSERT", 8: "0", 2: "ROW", 10: 5, 20: 0, 230: -1);
     let drawing = imported(&file(MM, &blocks, &(circle("0", 0.0, 0.0, 99.0) + &from_below))).drawing;
-    // (1, 2) scaled: (2, -4); turned: (4, 2); at (10, 20) and 30 further along the turned x: (14, 22), (14, 52). Placed at
-    // x 5 and seen from below: x = -(5 + 14).
+    // (1, 2) scaled: (2, -4); turned: (4, 2); at (10, 20) and 30 further along the turned x: (14, 22), (14, 52).
+    // Placed at x 5 and seen from below: x = -(5 + 14).
     let holes = &drawing.shape[1];
     let grid = holes.grid.expect("two holes");
     assert_eq!(

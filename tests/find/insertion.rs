@@ -108,7 +108,8 @@ fn the_four_parts_are_found_and_the_damaged_scans_are_never_wrong() {
             .unwrap_or_else(|e| panic!("{}: {e}", s.part));
         let (plane, height, angle) = error(&report, &s.truth);
         println!(
-            "{}: {plane:.4} mm in the plane, {height:.4} mm in height, {angle:.4} degrees; sigma {:.4?} mm {:.4?} degrees; two pins against lattice {:?} mm",
+            "{}: {plane:.4} mm in the plane, {height:.4} mm in height, {angle:.4} degrees; sigma {:.4?} mm {:.4?} \
+             degrees; two pins against lattice {:?} mm",
             s.part, report.sigma_mm, report.sigma_deg, report.disagreement_mm
         );
         for n in &report.notes {

@@ -184,7 +184,8 @@ fn a_thousand_noisy_cluttered_hidden_pairs() {
     let (px, deg) = (rms(hits.iter().map(|h| h.0.0)), rms(hits.iter().map(|h| h.0.1)));
     let over = rms(hits.iter().map(|h| h.0.1 / h.1[2]));
     println!(
-        "noisy: rms {px:.4} px, {deg:.4} degrees, recall {:.2} %, {alarms} false alarms, angle error over sigma {over:.2}",
+        "noisy: rms {px:.4} px, {deg:.4} degrees, recall {:.2} %, {alarms} false alarms, angle error over sigma \
+         {over:.2}",
         100.0 * recall
     );
     assert!(recall >= 0.995, "recall {recall:.4}, limit 0.995");

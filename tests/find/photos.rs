@@ -145,7 +145,8 @@ fn a_turned_connector_is_found() {
 fn circles_of_any_size_are_found() {
     let Some(circle) = scene("matching/shape_photos/case0/templ/circle.png") else { return };
     let model = ShapeModel::from_region(&circle, whole(&circle), None, &ModelOptions::default()).unwrap();
-    // A road sign, an iris (columns 158 to 257, rows 90 to 185), discs and rings of a pattern: centre and radius by eye.
+    // A road sign, an iris (columns 158 to 257, rows 90 to 185), discs and rings of a pattern: centre and radius by
+    // eye.
     let pattern = [
         [306.0, 112.0, 56.0],
         [197.0, 249.0, 44.0],

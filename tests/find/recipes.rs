@@ -1,5 +1,6 @@
-//! In: the parts of the four shipped recipes in other sizes, colours and poses, scanned by specimens of the station; whole,
-//! with shots missing, half hidden, not there, or another part. Out: judgement: a pose that passes is right, whole parts pass.
+//! In: the parts of the four shipped recipes in other sizes, colours and poses, scanned by specimens of the station;
+//! whole, with shots missing, half hidden, not there, or another part. Out: judgement: a pose that passes is right,
+//! whole parts pass.
 //! Frame and unit: the part's own axes; mm, degrees.
 
 use super::scanned::{Scan, Way, noisy, scanned};
@@ -48,24 +49,30 @@ fn solids(part: &str) -> (&'static str, f64, [f64; 2]) {
     match part {
         "led" => (
             "[[part.solid]]\nshape = { block = { size_mm = [30.48, 17.78, 4.2] } }\nat_mm = [0, 0, 0]\nMATERIAL\
-             [[part.solid.cut]]\nshape = { cone = { top_mm = 1.44, bottom_mm = 0.84, depth_mm = 2.5 } }\nrepeat = [12, 2]\npitch_mm = [2.54, 15.24]\n\
-             [[part.solid.cut]]\nshape = { block = { size_mm = [11.04, 12.4, 9] } }\nrepeat = [2, 1]\npitch_mm = [14.24, 0]\n\
+             [[part.solid.cut]]\nshape = { cone = { top_mm = 1.44, bottom_mm = 0.84, depth_mm = 2.5 } }\n\
+             repeat = [12, 2]\npitch_mm = [2.54, 15.24]\n\
+             [[part.solid.cut]]\nshape = { block = { size_mm = [11.04, 12.4, 9] } }\nrepeat = [2, 1]\n\
+             pitch_mm = [14.24, 0]\n\
              [[part.solid.cut]]\nshape = { cylinder = { diameter_mm = 3, depth_mm = 9 } }\nat_mm = [-15.24, 0, 0]\n",
             4.2,
             [19.0, 19.0],
         ),
         "osc" => (
             "[[part.solid]]\nshape = { block = { size_mm = [20.4, 12.8, 4] } }\nat_mm = [0, 0, 0]\nMATERIAL\
-             [[part.solid.cut]]\nshape = { cone = { top_mm = 1.44, bottom_mm = 0.84, depth_mm = 2.5 } }\nrepeat = [2, 2]\npitch_mm = [15.24, 7.62]\n\
+             [[part.solid.cut]]\nshape = { cone = { top_mm = 1.44, bottom_mm = 0.84, depth_mm = 2.5 } }\n\
+             repeat = [2, 2]\npitch_mm = [15.24, 7.62]\n\
              [[part.solid.cut]]\nshape = { block = { size_mm = [10.4, 4.4, 9] } }\n\
-             [[part.solid.cut]]\nshape = { block = { size_mm = [2.814, 20, 9] } }\nat_mm = [-10.2, -6.4, 0]\nturn_deg = 45\n",
+             [[part.solid.cut]]\nshape = { block = { size_mm = [2.814, 20, 9] } }\nat_mm = [-10.2, -6.4, \
+             0]\nturn_deg = 45\n",
             4.0,
             [13.5, 13.5],
         ),
         "flash" => (
             "[[part.solid]]\nshape = { block = { size_mm = [41.6, 18.2, 4.6] } }\nat_mm = [0, 0, 0]\nMATERIAL\
-             [[part.solid.cut]]\nshape = { block = { size_mm = [1.0, 1.7, 3] } }\nrepeat = [16, 2]\npitch_mm = [2.54, 15.24]\n\
-             [[part.solid.cut]]\nshape = { block = { size_mm = [10.8, 11.2, 9] } }\nrepeat = [2, 1]\npitch_mm = [26, 0]\n\
+             [[part.solid.cut]]\nshape = { block = { size_mm = [1.0, 1.7, 3] } }\nrepeat = [16, 2]\n\
+             pitch_mm = [2.54, 15.24]\n\
+             [[part.solid.cut]]\nshape = { block = { size_mm = [10.8, 11.2, 9] } }\nrepeat = [2, 1]\n\
+             pitch_mm = [26, 0]\n\
              [[part.solid.cut]]\nshape = { block = { size_mm = [11.6, 11.2, 9] } }\n\
              [[part.solid.cut]]\nshape = { cylinder = { diameter_mm = 3, depth_mm = 9 } }\nat_mm = [-20.8, 0, 0]\n",
             4.6,
@@ -75,7 +82,8 @@ fn solids(part: &str) -> (&'static str, f64, [f64; 2]) {
             "[[part.solid]]\nshape = { block = { size_mm = [134.4, 6.5, 9] } }\nat_mm = [0, 0, 0]\nMATERIAL\
              [[part.solid.cut]]\nshape = { block = { size_mm = [133.5, 3.3, 6] } }\n\
              [[part.solid]]\nshape = { block = { size_mm = [1.5, 3.3, 8] } }\nat_mm = [2.08, 0, -0.35]\nMATERIAL\
-             [[part.solid]]\nshape = { block = { size_mm = [6.45, 2.7, 17] } }\nat_mm = [0, 0, 8]\nrepeat = [2, 2]\npitch_mm = [137.55, 4.7]\nMATERIAL",
+             [[part.solid]]\nshape = { block = { size_mm = [6.45, 2.7, 17] } }\nat_mm = [0, 0, 8]\nrepeat = [2, \
+             2]\npitch_mm = [137.55, 4.7]\nMATERIAL",
             9.0,
             [12.0, 76.0],
         ),
@@ -112,7 +120,8 @@ fn scan(part: &'static str, seed: u64) -> Scanned {
     let material = format!("material = {{ albedo = {albedo} }}\n");
     let text = format!(
         "name = '{part}'\nregion_mm = [{}, {}, {}, {}]\nfocus_height_mm = 3.0\n\
-         [[solid]]\nshape = {{ block = {{ size_mm = [190, 190, 1.6] }} }}\nat_mm = [0, 0, 0]\nmaterial = {{ albedo = 0.45 }}\n\
+         [[solid]]\nshape = {{ block = {{ size_mm = [190, 190, 1.6] }} }}\nat_mm = [0, 0, 0]\n\
+         material = {{ albedo = 0.45 }}\n\
          [[part]]\nname = '{part}'\nat_mm = [{x}, {y}, {}]\nturn_deg = {turn}\ntilt_deg = [{tx}, {ty}]\n{}",
         -half[0],
         -half[1],
@@ -150,7 +159,8 @@ fn scan(part: &'static str, seed: u64) -> Scanned {
     let way = Way { from: -half[1], to: half[1], pitch, depths: [100.0, 230.0], pose_mm, pose_deg };
     let Scan { cloud, shots, rig, base_from_part: truth } = scanned(&station, &scene, &way, &mut rng);
     let about = format!(
-        "{part} {seed}: size {k:.2}, turn {turn:.0}, albedo {albedo:.2}, noise {noise:.2}, pitch {pitch:.2}, shaky {shaky}, {} points",
+        "{part} {seed}: size {k:.2}, turn {turn:.0}, albedo {albedo:.2}, noise {noise:.2}, pitch {pitch:.2}, shaky \
+         {shaky}, {} points",
         cloud.len()
     );
     Scanned { part, recipe: scaled(&recipe(part), k), cloud, shots, truth, rig, about, height: height * k }
@@ -223,7 +233,8 @@ fn cases(s: &Scanned, seed: u64) -> Vec<(&'static str, Outcome)> {
 
 #[test]
 fn a_pose_that_passes_is_right_whatever_the_part_the_pose_and_the_rig() {
-    // A few scans keep CI short; SHEETLIGHT_RECIPE_SCANS=20 gives the figures of benches/runs, SHEETLIGHT_SEED other ones.
+    // A few scans keep CI short; SHEETLIGHT_RECIPE_SCANS=20 gives the figures of benches/runs, SHEETLIGHT_SEED other
+    // ones.
     let number = |name: &str, usual: u64| std::env::var(name).ok().and_then(|s| s.parse().ok()).unwrap_or(usual);
     let (n, first) = (number("SHEETLIGHT_RECIPE_SCANS", 1), number("SHEETLIGHT_SEED", 1));
     let only = std::env::var("SHEETLIGHT_PART").ok();

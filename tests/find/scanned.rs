@@ -1,5 +1,5 @@
-//! In: a simulated station over a scene, how it moves and what the robot says of that. Out: the scan of it, as `scan` makes it, and where its
-//! first part stood.
+//! In: a simulated station over a scene, how it moves and what the robot says of that. Out: the scan of it, as `scan`
+//! makes it, and where its first part stood.
 //! Frame and unit: base frame, mm, degrees.
 
 use rand_pcg::Pcg64;

@@ -16,9 +16,11 @@ fn scene(rng: &mut Pcg64) -> Scene {
     let (x, y, turn, tx, ty) = (within(0.6), within(0.6), within(180.0), within(1.0), within(1.0));
     let text = format!(
         "name = 'relay'\nregion_mm = [-13, -13, 13, 13]\nfocus_height_mm = 3.0\n\
-         [[solid]]\nshape = {{ block = {{ size_mm = [190, 104, 1.6] }} }}\nat_mm = [0, 0, 0]\nmaterial = {{ albedo = 0.45 }}\n\
+         [[solid]]\nshape = {{ block = {{ size_mm = [190, 104, 1.6] }} }}\nat_mm = [0, 0, 0]\n\
+         material = {{ albedo = 0.45 }}\n\
          [[part]]\nname = 'relay'\nat_mm = [{x}, {y}, 4.2]\nturn_deg = {turn}\ntilt_deg = [{tx}, {ty}]\n\
-         [[part.solid]]\nshape = {{ block = {{ size_mm = [20, 12, 4.6] }} }}\nat_mm = [0, 0, 0]\nmaterial = {{ albedo = 0.5 }}\n\
+         [[part.solid]]\nshape = {{ block = {{ size_mm = [20, 12, 4.6] }} }}\nat_mm = [0, 0, 0]\n\
+         material = {{ albedo = 0.5 }}\n\
          [[part.solid.cut]]\nshape = {{ block = {{ size_mm = [9, 5, 3] }} }}\nat_mm = [0, 0, 0]\n\
          [[part.solid.cut]]\nshape = {{ cylinder = {{ diameter_mm = 4, depth_mm = 3 }} }}\nat_mm = [-10, 0, 0]\n"
     );

@@ -1,12 +1,12 @@
-//! In: a seed. Out: a design that nobody chose, from the space that stations are built in: picture, lens, sensor, side and angle of the laser,
-//! width of the stripe, distance. Frame and unit: as [`RigSpec`].
+//! In: a seed. Out: a design that nobody chose, from the space that stations are built in: picture, lens, sensor,
+//! side and angle of the laser, width of the stripe, distance. Frame and unit: as [`RigSpec`].
 
 use rand::{Rng, SeedableRng};
 use sheetlight::simulate::RigSpec;
 use sheetlight::simulate::rig_scene::TREAD_MM;
 
-/// Half-width of the sheet, px of the camera at the working distance (1 sigma), is drawn from here, the widest by their share of the picture's
-/// shorter side; the part's treads may ask for less (at the end).
+/// Half-width of the sheet, px of the camera at the working distance (1 sigma), is drawn from here, the widest by
+/// their share of the picture's shorter side; the part's treads may ask for less (at the end).
 const STRIPE_PX: [f64; 2] = [0.8, 6.0];
 const STRIPE_SHARE: f64 = 0.006;
 
@@ -69,8 +69,8 @@ pub fn rig(seed: u64) -> RigSpec {
     working.lean_deg = 0.0;
     spec.mount.turn_deg = even(-180.0, 180.0);
 
-    // On a level face the sheet's width is 1 / cos wider, and profiles along an image axis go farther along a slanted stripe (the judge's
-    // margin): what is left of a tread of the part is a quarter at least.
+    // On a level face the sheet's width is 1 / cos wider, and profiles along an image axis go farther along a slanted
+    // stripe (the judge's margin): what is left of a tread of the part is a quarter at least.
     let (s, c) = spec.laser.side_deg.to_radians().sin_cos();
     let lean = s.abs().min(c.abs()) / s.abs().max(c.abs());
     let widest = 0.75 * 0.5 * TREAD_MM[0] * spec.scale() / (3.0 * (1.0 + lean));

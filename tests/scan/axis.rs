@@ -1,6 +1,7 @@
-//! In: one simulated sensor over one stepped block, moved by a robot, or standing still while a linear axis or a turntable moves the
-//! block. Out: whether the scans are as accurate per pixel as the robot's, with the true axis and with one calibrated from
-//! pictures, on GPU and twins; and what becomes of gaps, counts backward, uneven counts and second passes.
+//! In: one simulated sensor over one stepped block, moved by a robot, or standing still while a linear axis or a
+//! turntable moves the block. Out: whether the scans are as accurate per pixel as the robot's, with the true axis and
+//! with one calibrated from pictures, on GPU and twins; and what becomes of gaps, counts backward, uneven counts and
+//! second passes.
 //! Frame and unit: part frame of the block, mm.
 
 use crate::common;
@@ -214,8 +215,8 @@ fn counts_are_taken_as_they_are() {
     assert!(said.contains("in 'mm'") && said.contains("calibrated in 'count'"), "{said}");
 }
 
-/// Poses are stated in the axis frame, and the report says so. On a turntable the stripe crosses the part in another direction at every
-/// place. `SHEETLIGHT_LONG`: the linear axis too, and as many shots as the simulated station takes.
+/// Poses are stated in the axis frame, and the report says so. On a turntable the stripe crosses the part in another
+/// direction at every place. `SHEETLIGHT_LONG`: the linear axis too, and as many shots as the simulated station takes.
 #[test]
 fn a_part_on_an_axis_is_found_in_its_frame() {
     let long = std::env::var_os("SHEETLIGHT_LONG").is_some();

@@ -1,4 +1,5 @@
-//! In: simulated scans of the designs in data/rigs. Out: the GPU and the processor of this machine give the same cloud, whole.
+//! In: simulated scans of the designs in data/rigs. Out: the GPU and the processor of this machine give the same
+//! cloud, whole.
 //! Frame and unit: mm, and pixel footprints of the rig. SHEETLIGHT_LONG: every design, in its own size.
 
 use crate::common;
@@ -9,9 +10,10 @@ use std::path::Path;
 
 /// Lying, upright, askew, bent by a barrel lens, behind a tilted sensor, narrower than a pixel.
 const SHORT: [&str; 6] = ["barrel", "behind", "fine", "scheimpflug", "slant45", "upright"];
-/// Of a footprint: 0.001 mm at the reference rigs' pixel of 0.25 mm. What the fit's rule of ending leaves beyond it: a fit whose last
-/// step is as long as the rule's limit, half a hundredth of the stripe's width, ends a step earlier on one side. Stripes are up to a pixel wide
-/// here, and a pixel moves a point on a sheet at 30 degrees by two footprints.
+/// Of a footprint: 0.001 mm at the reference rigs' pixel of 0.25 mm. What the fit's rule of ending leaves beyond it:
+/// a fit whose last step is as long as the rule's limit, half a hundredth of the stripe's width, ends a step earlier
+/// on one side. Stripes are up to a pixel wide here, and a pixel moves a point on a sheet at 30 degrees by two
+/// footprints.
 const APART: f64 = 0.004;
 const ONE_STEP: f64 = 0.02;
 /// So few points may have ended so, of a thousand.
@@ -47,7 +49,8 @@ fn every_rig_has_one_cloud_on_both_processors() {
             sheetlight(&["scan", &scan, "--station", &station, "--out", &to, "--on", on, "--overlays", "0", "--quiet"]);
             read_cloud(&Path::new(&to).join("cloud.ply")).unwrap()
         });
-        // What a pixel sees of the parts, from the points themselves: neighbours on a line lie that far from each other.
+        // What a pixel sees of the parts, from the points themselves: neighbours on a line lie that far from each
+        // other.
         let mut steps: Vec<f64> = twins.windows(2).filter(|w| w[0].shot == w[1].shot).map(spacing).collect();
         let middle = steps.len() / 2;
         let footprint = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;

@@ -118,7 +118,8 @@ fn centres_are_as_good_as_the_light_allows() {
             let centroid = errors(&stripe, Method::Centroid, 0.0, 1).0 / one;
             let derivative = errors(&stripe, Method::Derivative, 0.0, 1).0 / one;
             println!(
-                "{sigma:8.1} {peak:10.0} {one:9.4}  {:5.3} ({bias_one:+.4})  {:5.3} ({bias_wide:+.4})  {centroid:8.2} {derivative:11.2}",
+                "{sigma:8.1} {peak:10.0} {one:9.4}  {:5.3} ({bias_one:+.4})  {:5.3} ({bias_wide:+.4})  \
+                 {centroid:8.2} {derivative:11.2}",
                 sd_one / one,
                 sd_wide / wide
             );
@@ -250,8 +251,9 @@ fn response(stripe: &Stripe, method: Method, along: f32, period: f64, depth: f64
     (seen / depth.max(1e-9), rest.sqrt())
 }
 
-/// How fine a structure along the stripe is seen, beside the noise that is paid for it. A centre of gravity that is averaged along
-/// the stripe, with the same nearly Gaussian weight, until it is as quiet as the fit has lost more of the grooves.
+/// How fine a structure along the stripe is seen, beside the noise that is paid for it. A centre of gravity that is
+/// averaged along the stripe, with the same nearly Gaussian weight, until it is as quiet as the fit has lost more of
+/// the grooves.
 #[test]
 fn the_fit_keeps_more_detail_than_a_centroid_of_the_same_noise() {
     let mut faults = Vec::new();

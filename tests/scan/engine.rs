@@ -1,5 +1,6 @@
-//! In: simulated recordings, small and odd ones and deep ones, and scans that begin beside the part. Out: the scan on the GPU and
-//! the scan on the CPU twins give the same points, and the stripe is measured where it is seen. Frame and unit: base frame, mm; pixels.
+//! In: simulated recordings, small and odd ones and deep ones, and scans that begin beside the part. Out: the scan on
+//! the GPU and the scan on the CPU twins give the same points, and the stripe is measured where it is seen. Frame and
+//! unit: base frame, mm; pixels.
 
 use crate::common::clouds::apart;
 use crate::common::{self, sheetlight};
@@ -35,8 +36,8 @@ fn agree(name: &str, simulate: &[&str]) {
     assert!(cpu.len() > 1000, "{name}: {} points", cpu.len());
     let found = apart(&gpu, &cpu);
     println!("{name}: {} points, {found:?}", cpu.len());
-    // One in twenty thousand may fall on the other side of a limit that it lies on. Measured: 6.4e-5 mm, two digits of a
-    // coordinate's f32, on llvmpipe; 1e-4 mm on an H100. A quarter more is allowed.
+    // One in twenty thousand may fall on the other side of a limit that it lies on. Measured: 6.4e-5 mm, two digits
+    // of a coordinate's f32, on llvmpipe; 1e-4 mm on an H100. A quarter more is allowed.
     let same = found.alone * 20_000 <= cpu.len() && found.worst_mm < 1.25e-4;
     assert!(same, "{name}: {found:?} of {} points", cpu.len());
 }
@@ -51,8 +52,8 @@ fn gpu_and_twins_give_the_same_points() {
     agree("12 bits", &["--shots", "20", "--bits", "12", "--seed", "5"]);
 }
 
-/// A quarter turn changes neither how long the stripe is nor what the picture's longer side sees: the reach of support and the ends of a
-/// turntable's stripe follow from these.
+/// A quarter turn changes neither how long the stripe is nor what the picture's longer side sees: the reach of
+/// support and the ends of a turntable's stripe follow from these.
 #[test]
 fn a_turned_camera_has_the_same_stripe() {
     let (lying, upright) = ([0.0, 0.883, 0.469], [0.883, 0.0, 0.469]);
@@ -114,7 +115,8 @@ fn stripe(row: f32, sigma: f32, columns: std::ops::Range<u32>) -> Image {
     Image::from_u8(WIDTH, HEIGHT, (0..WIDTH * HEIGHT).map(level).collect())
 }
 
-/// A scan that begins in the dark or sees splinters of light at a part's edge first: the stripe is measured where it is seen.
+/// A scan that begins in the dark or sees splinters of light at a part's edge first: the stripe is measured where it
+/// is seen.
 #[test]
 fn a_scan_that_begins_beside_the_part_measures_the_stripe_all_the_same() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! In: faint stripes in noise, in every direction, as wide as stripes are, at 8 bits and at 12. Out: how much of each is found by what `scan`
-//! runs and how many specks are taken for light, beside the same with every lit pixel fitted.
+//! In: faint stripes in noise, in every direction, as wide as stripes are, at 8 bits and at 12. Out: how much of each
+//! is found by what `scan` runs and how many specks are taken for light, beside the same with every lit pixel fitted.
 //! Frame and unit: px; noise and light in grey levels of an 8-bit picture.
 
 use glam::Vec3;
@@ -22,7 +22,8 @@ const LENGTH: f64 = 560.0;
 /// Of what is found with every lit pixel fitted, so much is to stay; and so many specks may.
 const STAYS: f64 = 0.98;
 const SPECKS: f64 = 0.25;
-/// Of the pixel steps along a stripe, so many are found; with light looked for four sigmas above the noise it is a third.
+/// Of the pixel steps along a stripe, so many are found; with light looked for four sigmas above the noise it is a
+/// third.
 const FOUND: f64 = 0.5;
 
 #[derive(Clone, Copy, Debug)]

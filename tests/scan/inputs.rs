@@ -1,5 +1,5 @@
-//! In: one simulated recording, written in every picture format and through the raw pipe. Out: the cloud is the one of the
-//! PNG recording. Frame and unit: base frame, mm; grey levels.
+//! In: one simulated recording, written in every picture format and through the raw pipe. Out: the cloud is the one
+//! of the PNG recording. Frame and unit: base frame, mm; grey levels.
 
 use crate::common::{sheetlight, sheetlight_fails};
 use sheetlight::raster::{Channel, Image, Pixels, load};

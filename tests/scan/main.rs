@@ -1,5 +1,5 @@
-//! In: pictures of laser stripes, drawn or simulated, with known truth. Out: whether the way from pixels to a cloud is right on
-//! GPU and twins, and whether what cannot be scanned is explained.
+//! In: pictures of laser stripes, drawn or simulated, with known truth. Out: whether the way from pixels to a cloud
+//! is right on GPU and twins, and whether what cannot be scanned is explained.
 //! Frame and unit: px of the picture, mm of the base frame.
 
 #[path = "../common/mod.rs"]

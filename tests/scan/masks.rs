@@ -125,9 +125,9 @@ fn the_gpu_gives_the_masks_and_skeletons_of_opencv() {
     assert!(gaussian > 300_000 && differing * 100_000 <= gaussian, "{differing} of {gaussian} pixels differ");
 }
 
-/// Stripes of one to three pixels at every angle and place, as far as they reach: every column (or row, where they stand) that
-/// crosses one has a pixel of its skeleton, there or beside it, and hardly more than one, by the rule for its direction. Zhang-Suen's
-/// alone loses all of some.
+/// Stripes of one to three pixels at every angle and place, as far as they reach: every column (or row, where they
+/// stand) that crosses one has a pixel of its skeleton, there or beside it, and hardly more than one, by the rule for
+/// its direction. Zhang-Suen's alone loses all of some.
 #[test]
 fn thinning_loses_no_stripe() {
     const SIZE: u32 = 72;

@@ -1,4 +1,5 @@
-//! Pictures of a region of the sensor, and binned ones, give the points of the whole ones; unexplained ones are refused.
+//! Pictures of a region of the sensor, and binned ones, give the points of the whole ones; unexplained ones are
+//! refused.
 
 use crate::common::{sheetlight, sheetlight_fails};
 use sheetlight::camera::Readout;
@@ -163,7 +164,7 @@ fn a_size_that_nobody_explains_is_refused_and_a_persons_word_counts() {
     assert!(told == scan(&silent, "word", &["--region", "150,110"]), "another cloud by a person's word");
     assert!(told != scan(&silent, "wrong", &["--binned", "2"]), "the word is used");
     let said = refused(&telling, &["--region", "0,0"]);
-    assert!(said.contains("leave --region and --binned out"), "{said}");
+    assert!(said.contains("omit --region and --binned"), "{said}");
     let said = refused(&silent, &["--region", "400,0"]);
     assert!(said.contains("another sensor"), "{said}");
 }

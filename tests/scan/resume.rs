@@ -1,5 +1,5 @@
-//! In: scans that end in the middle: the device is lost, the disk takes no more, the program is killed. Out: a clear error,
-//! nothing under a final name, and a resumed scan with the very points of an undisturbed one.
+//! In: scans that end in the middle: the device is lost, the disk takes no more, the program is killed. Out: a clear
+//! error, nothing under a final name, and a resumed scan with the very points of an undisturbed one.
 //! Frame and unit: base frame, mm.
 
 use crate::common::sheetlight;
@@ -157,8 +157,8 @@ fn a_lost_device_costs_no_finished_shot() {
     assert!(resumed == whole && whole.len() > 10_000, "{} and {} points", resumed.len(), whole.len());
 }
 
-/// The shell lets no file grow beyond some 1 to 2 MB (its block is 512 or 1,024 bytes): as on a full disk, writing fails
-/// in the middle of the scan.
+/// The shell lets no file grow beyond some 1 to 2 MB (its block is 512 or 1,024 bytes): as on a full disk, writing
+/// fails in the middle of the scan.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_disk_that_fills_up_costs_no_finished_shot() {

@@ -1,5 +1,5 @@
-//! In: a ball under simulated sensors of several designs. Out: failure where its flanks are not in the cloud: across a slanted stripe the
-//! sheet's light is narrower than on a level face, and no sign of something else.
+//! In: a ball under simulated sensors of several designs. Out: failure where its flanks are not in the cloud: across
+//! a slanted stripe the sheet's light is narrower than on a level face, and no sign of something else.
 //! Frame and unit: base frame, mm; slopes against the upright, degrees.
 
 use crate::common::sheetlight;
@@ -27,7 +27,8 @@ at_mm = [0, 0, 0]
 material = { albedo = 0.6 }
 "#;
 
-/// Of the points on the ball's flanks, slopes of 55 to 78 degrees: their number, the rms of their distances, mm, and of these over the stated sigmas.
+/// Of the points on the ball's flanks, slopes of 55 to 78 degrees: their number, the rms of their distances, mm, and
+/// of these over the stated sigmas.
 fn flanks(cloud: &[CloudPoint], truth: &Truth) -> (usize, f64, f64) {
     let part = truth.file.parts[0].base_from_part;
     let middle = part.point(&Vec3::new(0.0, 0.0, -RADIUS));

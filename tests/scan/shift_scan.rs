@@ -37,7 +37,8 @@ fn real_photographs_give_the_cube_and_the_steps() {
             let report = scan(&folder, name, empty, channel);
             let p = report.plateau.unwrap_or_else(|| panic!("{name}: no level surface, {report:?}"));
             println!(
-                "{name:24} {channel:?} {empty:?}: {:.3} mm, want {want} ({:+.3}); noise {:.3}, between pictures {:.3} mm, {} points in {} pictures; bed {:.3} mm",
+                "{name:24} {channel:?} {empty:?}: {:.3} mm, want {want} ({:+.3}); noise {:.3}, between pictures \
+                 {:.3} mm, {} points in {} pictures; bed {:.3} mm",
                 p.height_mm,
                 p.height_mm - want,
                 p.noise_mm,

@@ -1,5 +1,6 @@
-//! In: straight and bent stripes whose speckle has grains larger than a pixel, as a lens blurs them. Out: failure where the grains' size is not
-//! measured, or where the error of the centres is not what they state. Frame and unit: px; grains as the sigma of the lens's blur.
+//! In: straight and bent stripes whose speckle has grains larger than a pixel, as a lens blurs them. Out: failure
+//! where the grains' size is not measured, or where the error of the centres is not what they state. Frame and unit:
+//! px; grains as the sigma of the lens's blur.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -123,8 +124,8 @@ fn row(c: &Case) -> (String, Vec<String>) {
     (text, faults)
 }
 
-/// Taken for pixels that are speckled each by itself, grains of 2 px would make what is stated a quarter of the error, and centres worse by
-/// a sixth.
+/// Taken for pixels that are speckled each by itself, grains of 2 px would make what is stated a quarter of the
+/// error, and centres worse by a sixth.
 #[test]
 fn grains_of_speckle_are_in_what_a_centre_states() {
     let mut cases = Vec::new();

@@ -1,5 +1,6 @@
-//! In: straight stripes of every width at every angle, light integrated over each pixel. Out: error of the centres against the
-//! Cramer-Rao bound of their window and against the sigma they state, as a table. Frame and unit: px across the stripe; grey levels of 8 bits.
+//! In: straight stripes of every width at every angle, light integrated over each pixel. Out: error of the centres
+//! against the Cramer-Rao bound of their window and against the sigma they state, as a table. Frame and unit: px
+//! across the stripe; grey levels of 8 bits.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -16,9 +17,9 @@ const ANGLES: [f64; 8] = [0.0, 15.0, 31.0, 38.0, 45.0, 52.0, 75.0, 90.0];
 /// Sub-pixel places of the line, one picture each; windows that share few pixels, in each picture.
 const PHASES: usize = 6;
 const WINDOWS: usize = 40;
-/// Limits: stated sigma over the real error; what is left of the error without noise, over the bound; width off the true one; error
-/// over the bound: of a speckled stripe whose flanks say most of it more is left on the table where it is slanted, because the pixels of a
-/// sample lie up to half a pixel apart across it and their light differs.
+/// Limits: stated sigma over the real error; what is left of the error without noise, over the bound; width off the
+/// true one; error over the bound: of a speckled stripe whose flanks say most of it more is left on the table where
+/// it is slanted, because the pixels of a sample lie up to half a pixel apart across it and their light differs.
 const OVERCONFIDENT: f64 = 0.85;
 const OVERCAUTIOUS: f64 = 1.25;
 const OWN: f64 = 0.3;
@@ -59,8 +60,8 @@ impl Light {
     }
 }
 
-/// Light of a stripe of height one over the distance of a pixel's middle from its centre line, the Gaussian integrated over
-/// the pixel's area.
+/// Light of a stripe of height one over the distance of a pixel's middle from its centre line, the Gaussian
+/// integrated over the pixel's area.
 struct Profile {
     sigma: f64,
     reach: f64,
@@ -162,9 +163,9 @@ impl Shot {
     }
 }
 
-/// Least standard deviation of an unbiased centre whose light is weighted along the stripe as documented, over all that lies
-/// across: sum(w² F) / sum(w F)², F the Fisher information of a pixel's mean. Amplitude and width are even, the centre is odd:
-/// not knowing them costs nothing.
+/// Least standard deviation of an unbiased centre whose light is weighted along the stripe as documented, over all
+/// that lies across: sum(w² F) / sum(w F)², F the Fisher information of a pixel's mean. Amplitude and width are even,
+/// the centre is odd: not knowing them costs nothing.
 fn bound(profile: &Profile, light: &Light, (nx, ny): (f64, f64)) -> f64 {
     let radius = 2.4 * (profile.sigma * profile.sigma + 1.0 / 12.0).sqrt();
     let reach = (profile.reach + radius).ceil() as i32;
@@ -254,8 +255,8 @@ fn row(sigma: f64, angle_deg: f64, light: &Light) -> Row {
     Row { text, faults }
 }
 
-/// Speckle makes the edges of a wide stripe ragged, and its skeleton runs up to 1.2 widths beside the middle: the rig 'wide' (9 px) had 1.27
-/// of its prediction, and has 1.11 since the fit begins in the middle.
+/// Speckle makes the edges of a wide stripe ragged, and its skeleton runs up to 1.2 widths beside the middle: the rig
+/// 'wide' (9 px) had 1.27 of its prediction, and has 1.11 since the fit begins in the middle.
 #[test]
 fn a_skeleton_beside_the_middle_costs_no_accuracy() {
     let mut faults = Vec::new();
@@ -299,7 +300,8 @@ fn every_width_at_every_angle() {
     let cases: Vec<_> = lights.flat_map(|(sigma, light)| ANGLES.map(|angle| (sigma, angle, light))).collect();
     let rows: Vec<Row> = cases.par_iter().map(|&(sigma, angle, light)| row(sigma, angle, light)).collect();
     println!(
-        "over the bound: rms error, mean error, error without noise; over the rms error: stated sigma; over the true one: width"
+        "over the bound: rms error, mean error, error without noise; over the rms error: stated sigma; over the true \
+         one: width"
     );
     println!("sigma angle  light     bound px    rms px    rms stated   mean    own  width");
     for r in &rows {
@@ -312,8 +314,8 @@ fn every_width_at_every_angle() {
 /// Error of a centre that is well known, px: what a direction that is known to a degree or two leaves.
 const CLOSE: f64 = 0.05;
 
-/// Where a stripe of `sigma` px at this angle leaves a picture without noise, over its last two widths: the worst error beyond [`CLOSE`], in
-/// stated sigmas, which say what noise makes of the light that is left.
+/// Where a stripe of `sigma` px at this angle leaves a picture without noise, over its last two widths: the worst
+/// error beyond [`CLOSE`], in stated sigmas, which say what noise makes of the light that is left.
 fn where_it_leaves(sigma: f64, angle_deg: f64, size: [u32; 2]) -> f64 {
     let (sin, cos) = angle_deg.to_radians().sin_cos();
     let normal = (-sin, cos);
@@ -351,7 +353,8 @@ fn where_it_leaves(sigma: f64, angle_deg: f64, size: [u32; 2]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Half of the window is missing there, and differences reach beyond the picture: without care for that a centre is up to 94 sigmas off.
+/// Half of the window is missing there, and differences reach beyond the picture: without care for that a centre is
+/// up to 94 sigmas off.
 #[test]
 fn a_stripe_is_placed_where_it_leaves_the_picture() {
     let mut faults = Vec::new();

@@ -1,4 +1,5 @@
-//! Clouds of other programs: fields that are not needed, kinds of numbers, the sensor's place, points without measurement.
+//! Clouds of other programs: fields that are not needed, kinds of numbers, the sensor's place, points without
+//! measurement.
 
 use sheetlight::fault::Fault;
 use sheetlight::scan::{Lines, Raw, Stated, lines, read_foreign};
@@ -24,7 +25,8 @@ fn pcd(
     data: &str,
 ) -> Vec<u8> {
     let head = format!(
-        "# .PCD v0.7\nVERSION 0.7\nFIELDS {name} x y z\nSIZE {size} 4 4 4\nTYPE {kind} f F F\nCOUNT {count} 1 1 1\nWIDTH 40\n\
+        "# .PCD v0.7\nVERSION 0.7\nFIELDS {name} x y z\nSIZE {size} 4 4 4\nTYPE {kind} f F F\nCOUNT {count} 1 1 \
+         1\nWIDTH 40\n\
          HEIGHT {}\nVIEWPOINT {viewpoint}\nPOINTS {}\nDATA {data}\n",
         points.len() / 40,
         points.len()
@@ -97,7 +99,8 @@ fn lists_and_other_elements_of_a_ply_are_passed_over() {
         let xyz = "property float x\nproperty FLOAT32 y\nproperty Float z\nproperty uint64 t\n";
         let head = |before: &str, after: &str| {
             format!(
-                "ply\nformat {name} 1.0\ncomment this end_header is none\nobj_info num_cols 40\n{before}element vertex {n}\n{xyz}\
+                "ply\nformat {name} 1.0\ncomment this end_header is none\nobj_info num_cols 40\n{before}element \
+                 vertex {n}\n{xyz}\
                  {after}end_header\n"
             )
         };
@@ -124,7 +127,8 @@ fn lists_and_other_elements_of_a_ply_are_passed_over() {
             assert!(read_foreign(&file[..file.len() - 1]).is_err());
         }
     }
-    let text = "ply\nformat ascii 1.0\nelement vertex 2\nproperty list uchar int seen\nproperty double X\nproperty double Y\n\
+    let text = "ply\nformat ascii 1.0\nelement vertex 2\nproperty list uchar int seen\nproperty double X\nproperty \
+                double Y\n\
                 property int64 Z\nend_header\n2 8 9 1 2 3\n0 4 5 6\n";
     let Raw::Points { points, .. } = read_foreign(text.as_bytes()).unwrap() else { panic!() };
     assert_eq!(points, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);

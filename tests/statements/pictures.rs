@@ -1,4 +1,5 @@
-//! Pictures of heights and of light in every format: orientation, kinds of numbers, white, missing levels, pages, colour.
+//! Pictures of heights and of light in every format: orientation, kinds of numbers, white, missing levels, pages,
+//! colour.
 
 use crate::tiff::{Page, tiff};
 use sheetlight::fault::Fault;

@@ -77,7 +77,7 @@ for who in seen:
     assert len(numbers) >= LEAST and numbers == sorted(set(numbers)), f"{who}: {len(numbers)} pictures, newest first"
     # The first pictures show the stage what the stripe is like.
     assert all(p > 100 for _, p, _ in seen[who][3:]), [p for _, p, _ in seen[who]]
-over = count["dropped"].get("passed over: a newer one came", 0)
+over = count["dropped"].get("skipped: a newer one came", 0)
 assert count["seen"] == sent, (count, sent)
 print(f"{sent} pictures at {RATE}/s to two that look on: {[len(seen[k]) for k in seen]} shown, {over} passed over, delay p50/p99 {bar['delay_ms']} ms")
 s.end()

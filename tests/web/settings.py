@@ -47,7 +47,7 @@ def settings(program, s, b, shot):
         f.write("# later\n")
     change(b, "tolerance_mm", "0.5")
     b.click("#save-settings")
-    b.until("that the file is another one", "return /other ones by now/.test(document.querySelector('#main .problem')?.innerText ?? '')")
+    b.until("that the file is another one", "return /changed since this page/.test(document.querySelector('#main .problem')?.innerText ?? '')")
     assert text(s) == now + "# later\n"
     # The backup from before the first change comes back, calibrations and all; what is put away for it is a backup too.
     kept = [k for k in s.json("GET", "/settings")["backups"] if "settings" in k["name"]]

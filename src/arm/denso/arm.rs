@@ -11,8 +11,8 @@ use crate::fault::{Kind, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use std::sync::Arc;
 
-/// Speed of the flange when all joints go at 100 %, mm/s: an upper bound for the VS-060 (joint 1 at 213.75 degrees a second,
-/// 0.92 m out).
+/// Speed of the flange when all joints go at 100 %, mm/s: an upper bound for the VS-060 (joint 1 at 213.75 degrees a
+/// second, 0.92 m out).
 const JOINTS_FULL_MM_S: f64 = 3500.0;
 /// Turning rate of the flange then, degrees/s: the sum of the VS-060's joints, which no way of theirs exceeds.
 const JOINTS_FULL_DEG_S: f64 = 1240.0;
@@ -58,7 +58,8 @@ impl Denso {
         self.session.client.read(Call::ControllerGetVariable, self.session.controller, name)
     }
 
-    /// Share of the full speeds, %. On a straight way shift and turn end together: whichever takes longer sets the time.
+    /// Share of the full speeds, %. On a straight way shift and turn end together: whichever takes longer sets the
+    /// time.
     fn percent(&self, way: Way, pace: &Pace) -> f64 {
         let share = match way {
             Way::Straight => (pace.flange_mm_s / self.full.mm_s).max(pace.turn_deg_s / self.full.deg_s),
@@ -158,8 +159,8 @@ impl Arm for Denso {
     fn make(&mut self, allowed: Allowed) -> Result<()> {
         let motion = allowed.motion();
         let percent = self.percent(motion.way, allowed.pace()) as f32;
-        // Left to itself a controller takes the square of the speed, with which steps of less than a millimetre take as long as they
-        // are many: 0.25 % at 50 mm/s.
+        // Left to itself a controller takes the square of the speed, with which steps of less than a millimetre take
+        // as long as they are many: 0.25 % at 50 mm/s.
         let ramps = (2.0 * percent).clamp(LEAST_RAMP, 100.0);
         self.session.execute("ExtSpeed", Variant::F32s(vec![percent, ramps, ramps]))?;
         let way = Variant::I32(if motion.way == Way::Straight { 2 } else { 1 });

@@ -1,4 +1,5 @@
-//! In: the wish to stop. Out: Halt over a connection of its own, which no motion blocks and which does not hold the arm.
+//! In: the wish to stop. Out: Halt over a connection of its own, which no motion blocks and which does not hold the
+//! arm.
 //! Frame and unit: none.
 
 use super::spare::Spare;

@@ -18,8 +18,8 @@ pub struct Carried {
 }
 
 impl Carried {
-    /// `tool`: its tip; `None` where none is described. `head`: points of the sensor head, none of them where nothing of it rides on the
-    /// flange; an error says why nobody knows.
+    /// `tool`: its tip; `None` where none is described. `head`: points of the sensor head, none of them where nothing
+    /// of it rides on the flange; an error says why nobody knows.
     pub fn new(tool: Option<Vec3>, head: std::result::Result<Vec<Vec3>, String>) -> Carried {
         let mut points = vec![Point { name: "the flange", at: Vec3::zeros() }];
         let mut unknown = Vec::new();

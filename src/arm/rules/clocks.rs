@@ -3,10 +3,11 @@
 use super::super::TimedPose;
 use std::time::{Duration, Instant};
 
-/// A second of the controller's lasts between half and twice as long here (as for lines of poses, `capture::pair`): another rate means
-/// another unit, or stamps that stand still.
+/// A second of the controller's lasts between half and twice as long here (as for lines of poses, `capture::pair`):
+/// another rate means another unit, or stamps that stand still.
 pub const RATE: (f64, f64) = (0.5, 2.0);
-/// Rates are judged over at least this time: stamps are whole milliseconds, and poses as old as a cycle of the controller.
+/// Rates are judged over at least this time: stamps are whole milliseconds, and poses as old as a cycle of the
+/// controller.
 pub const RATE_SPAN: Duration = Duration::from_millis(100);
 
 /// Compares the stamps of poses with when they were asked for and when they were here.
@@ -16,8 +17,8 @@ pub struct Clocks {
 }
 
 impl Clocks {
-    /// Why the controller's stamps cannot be believed. How long the answers took does not matter: a pose was read between question and
-    /// answer, and only a rate that no moment between them explains is wrong.
+    /// Why the controller's stamps cannot be believed. How long the answers took does not matter: a pose was read
+    /// between question and answer, and only a rate that no moment between them explains is wrong.
     pub fn judge(&mut self, pose: &TimedPose) -> Option<String> {
         let device = pose.device?.as_secs_f64();
         let Some((asked, here, before)) = self.since else {
@@ -37,7 +38,8 @@ impl Clocks {
         let wrong = passed < RATE.0 * least || passed > RATE.1 * most;
         wrong.then(|| {
             format!(
-                "the controller's time went on by {:.3} s within {least:.3} to {most:.3} s, a rate of {} to {} is allowed: \
+                "the controller's time went on by {:.3} s within {least:.3} to {most:.3} s, a rate of {} to {} is \
+                 allowed: \
                  its stamps stand still or are in another unit, and speed cannot be watched",
                 passed, RATE.0, RATE.1
             )

@@ -17,14 +17,13 @@ fn stated(what: &str) -> Vec<f64> {
 
 #[test]
 fn the_limits_of_the_example_are_the_usual_ones() {
-    let begin = DOCUMENT.find("    [motion]\n").expect("an example");
-    let block = DOCUMENT[begin..].lines().take_while(|l| l.is_empty() || l.starts_with("    "));
-    let text = block.map(|l| l.trim_start()).collect::<Vec<_>>().join("\n");
+    let (_, begin) = DOCUMENT.split_once("```toml\n").expect("an example");
+    let (text, _) = begin.split_once("```").expect("the example ends");
     #[derive(serde::Deserialize)]
     struct Example {
         motion: Limits,
     }
-    let example = toml::from_str::<Example>(&text).expect("the example is read").motion;
+    let example = toml::from_str::<Example>(text).expect("the example is read").motion;
     assert_eq!(Limits { keep_out: example.keep_out.clone(), ..Limits::within(example.workspace) }, example);
     assert!(text.contains(&format!("never above {MOST_SPEED_MM_S}")));
     let cited =
@@ -40,13 +39,13 @@ fn the_numbers_of_the_watch_are_those_of_the_document() {
     let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
     let pair = |(a, b): (f64, f64)| vec![a, b];
     for (what, is) in [
-        ("stop button and silence are looked at every", vec![ms(watch::LOOK)]),
-        ("speeds are taken over at least", vec![watch::SPAN_S * 1e3]),
+        ("stop button and silence are checked every", vec![ms(watch::LOOK)]),
+        ("speeds are averaged over at least", vec![watch::SPAN_S * 1e3]),
         ("a point is too fast above", pair(watch::SPEED_SLACK)),
         ("a turn is too fast above", pair(watch::TURN_SLACK)),
         ("the flange has left the workspace from", vec![watch::OUTSIDE_MM]),
         ("the controller's time runs at", pair(clocks::RATE)),
-        ("rates are taken over at least", vec![ms(clocks::RATE_SPAN)]),
+        ("rates are averaged over at least", vec![ms(clocks::RATE_SPAN)]),
         ("a leg begins within", vec![ms(standing::START)]),
         ("a pose has changed from", pair(tolerances::STILL)),
         ("a motion has arrived within", pair(tolerances::ARRIVED)),

@@ -30,7 +30,8 @@ const ORTHONORMAL: f64 = 1e-6;
 
 /// No leg is slower, mm/s: below it an arm that moves cannot be told from one that stands.
 pub const SLOWEST_MM_S: f64 = 0.1;
-/// A way is looked at in turns of at most so much, rad: a point 300 mm off the flange passes 0.02 mm from the chord of such a turn.
+/// A way is looked at in turns of at most so much, rad: a point 300 mm off the flange passes 0.02 mm from the chord
+/// of such a turn.
 const PIECE: f64 = 0.02;
 
 /// How far a matrix is from a rotation; infinite where a number is.
@@ -64,7 +65,7 @@ pub fn gates(plan: &Plan, limits: &Limits, carried: &Carried, now: &Situation) -
         must("armed", now.armed),
         must("the arm's place is known", !now.unknown),
         Gate::least("motions", plan.legs.len() as f64, 1.0),
-        Gate::most("departure from a rotation", worst(&|_, leg| departure(&leg.to)), ORTHONORMAL),
+        Gate::most("orthonormality error of the rotation", worst(&|_, leg| departure(&leg.to)), ORTHONORMAL),
         Gate::most("speed, mm/s", worst(&|_, leg| leg.speed_mm_s), limits.speed_mm_s.min(MOST_SPEED_MM_S)),
         Gate::least("slowest speed, mm/s", slowest(plan), SLOWEST_MM_S),
         Gate::most("turning rate, degrees/s", worst(&|from, leg| pace(from, leg, carried, limits).turn_deg_s), turning),

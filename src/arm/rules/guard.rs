@@ -1,5 +1,5 @@
-//! In: plans and confirmations. Out: motions, each allowed, watched and logged; after one that was stopped nothing moves until
-//! somebody has looked at the robot.
+//! In: plans and confirmations. Out: motions, each allowed, watched and logged; after one that was stopped nothing
+//! moves until somebody has looked at the robot.
 //! Frame and unit: base_from_flange, mm, degrees, mm/s.
 
 use super::super::{Allowed, Arm, Halt, Motion, PoseSource, Reach, TimedPose, Way};
@@ -77,7 +77,8 @@ impl Guard {
         self.limits.as_ref()
     }
 
-    /// Takes the arm for motions: opens the connections that stop it and watch it. `allowed` is the operator's --allow-motion.
+    /// Takes the arm for motions: opens the connections that stop it and watch it. `allowed` is the operator's
+    /// --allow-motion.
     ///
     /// # Errors
     /// It was not allowed, no limits are stated, the link only reads, another program has the arm.
@@ -85,10 +86,10 @@ impl Guard {
         if !allowed {
             return Err(Fault::refused(format!("{}: read-only", self.link.name()))
                 .cause("motion was not allowed")
-                .next("give --allow-motion where the arm may move and somebody stands at the emergency stop"));
+                .next("give --allow-motion when somebody stands at the emergency stop"));
         }
         let Some(limits) = &self.limits else {
-            return Err(Fault::refused("no workspace is stated: nothing says where the arm may be")
+            return Err(Fault::refused("no workspace is stated: the limits of the arm are unknown")
                 .cause("station.toml has no [motion]")
                 .next("write [motion] with workspace = { from_mm = [...], to_mm = [...] } (docs/robots.md)"));
         };
@@ -105,13 +106,14 @@ impl Guard {
         self.link.give()
     }
 
-    /// Whether a straight way keeps inside the workspace and out of the keep-outs, with all that the flange carries. Nothing is asked of
-    /// the robot; without limits no way is free.
+    /// Whether a straight way keeps inside the workspace and out of the keep-outs, with all that the flange carries.
+    /// Nothing is asked of the robot; without limits no way is free.
     pub fn keeps_clear(&self, from: &Rigid<Base, Flange>, to: &Rigid<Base, Flange>) -> bool {
         self.limits.as_ref().is_some_and(|limits| free(&self.carried, limits, from, to))
     }
 
-    /// A person has looked at the robot after a motion that was stopped, and said so: no program says it by itself. The pose is read anew.
+    /// A person has looked at the robot after a motion that was stopped, and said so: no program says it by itself.
+    /// The pose is read anew.
     pub fn looked(&mut self) -> Result<TimedPose> {
         let pose = self.link.pose()?;
         self.unknown = None;
@@ -177,12 +179,12 @@ impl Guard {
         Ok(Judged { gates, reasons, unjudged })
     }
 
-    /// Makes a plan that was confirmed, once. `each` is called after each leg, the arm standing still, with the leg's number; its
-    /// error ends the plan there.
+    /// Makes a plan that was confirmed, once. `each` is called after each leg, the arm standing still, with the leg's
+    /// number; its error ends the plan there.
     ///
     /// # Errors
-    /// A gate is not met (any more), the confirmation is of another proposal, was used or is too old, the controller would not begin
-    /// a leg, or the motion was stopped: then the arm stands wherever it was stopped.
+    /// A gate is not met (any more), the confirmation is of another proposal, was used or is too old, the controller
+    /// would not begin a leg, or the motion was stopped: then the arm stands wherever it was stopped.
     pub fn make(
         &mut self,
         proposal: &Proposal,
@@ -192,8 +194,8 @@ impl Guard {
         self.attempt(proposal, confirmation, each)?.map_or(Ok(()), Err)
     }
 
-    /// The same for who has another way: a leg that the controller would not begin comes back as what it said. The arm then stands
-    /// where that leg was to begin, its place is known, and something else may be proposed.
+    /// The same for who has another way: a leg that the controller would not begin comes back as what it said. The
+    /// arm then stands where that leg was to begin, its place is known, and something else may be proposed.
     ///
     /// # Errors
     /// All others of [`Guard::make`].
@@ -272,7 +274,7 @@ impl Guard {
         if missed.is_empty() {
             return Ok(());
         }
-        refused(missed.join("; "), "what is named is not as it has to be")
+        refused(missed.join("; "), "a condition named above is not met")
     }
 
     /// What the controller said where it would not begin a leg.
@@ -346,10 +348,11 @@ struct Judged {
     unjudged: Vec<String>,
 }
 
-/// In a row of legs the controller is asked for so many of them besides its ends.
+/// Number of legs within a row whose reach the controller is asked about, besides the row's two ends.
 const ASKED: usize = 8;
 
-/// The poses for which the controller is asked: those where a plan's way bends, and some of those in the middle of a straight row.
+/// The poses for which the controller is asked: those where a plan's way bends, and some of those in the middle of a
+/// straight row.
 fn ends<'a>(from: &Rigid<Base, Flange>, legs: &'a [Motion]) -> impl Iterator<Item = &'a Motion> {
     let stride = (legs.len() / ASKED).max(1);
     let from = *from;
@@ -391,8 +394,8 @@ fn all(
     Ok(None)
 }
 
-/// An order that was answered with an error, read again: the arm is ready as before it and stands where it stood, so nothing was
-/// begun. Everything else is an error: nobody knows what the arm does.
+/// An order that was answered with an error, read again: the arm is ready as before it and stands where it stood, so
+/// nothing was begun. Everything else is an error: nobody knows what the arm does.
 fn not_begun(link: &mut dyn Arm, before: &TimedPose, fault: Fault) -> Result<Fault> {
     if fault.kind != Kind::Refused {
         return Err(fault);
@@ -405,7 +408,7 @@ fn not_begun(link: &mut dyn Arm, before: &TimedPose, fault: Fault) -> Result<Fau
     }
     Ok(fault
         .cause("the controller would not begin this motion; the arm has not moved")
-        .next("go there another way: from another place, or in parts"))
+        .next("reach the pose from another start, or in several motions"))
 }
 
 /// Looks where the arm has come to.
@@ -424,8 +427,8 @@ fn arrived(link: &mut dyn Arm, leg: &Motion, before: &TimedPose) -> Result<()> {
     }
     match (before.figure, after.figure) {
         (Some(a), Some(b)) if a != b && leg.way == Way::Straight => {
-            Err(Fault::device(format!("the figure changed on the way, from {a} to {b}"))
-                .cause("the controller found another way for its joints")
+            Err(Fault::device(format!("the arm configuration changed on the way, from {a} to {b}"))
+                .cause("the controller chose other joint angles")
                 .next("look at the robot, and approach from another side"))
         }
         _ => Ok(()),
@@ -433,13 +436,13 @@ fn arrived(link: &mut dyn Arm, leg: &Motion, before: &TimedPose) -> Result<()> {
 }
 
 fn unwatched(e: std::io::Error) -> Fault {
-    Fault::device(format!("no thread can be had that watches the motion: {e}"))
+    Fault::device(format!("cannot start the thread that watches the motion: {e}"))
         .cause("too many threads or too little memory; nothing was moved")
         .next("end other programs, then try again")
 }
 
 fn stopped(why: String) -> Fault {
     Fault::device(why)
-        .cause("the motion was stopped; where the arm stands is not known")
-        .next("look at the robot, then go on")
+        .cause("the motion was stopped; the arm's pose is unknown")
+        .next("look at the robot, then continue")
 }

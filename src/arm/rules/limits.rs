@@ -4,8 +4,9 @@
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec3;
 
-/// No carried point is faster, whatever is asked for, mm/s: ISO 10218-1:2011, 5.6.2, under reduced speed control the speed of the tool centre
-/// point is at most this. It is no reduced speed control in that standard's sense: that has to be the controller's own.
+/// No carried point is faster, whatever is asked for, mm/s: ISO 10218-1:2011, 5.6.2, under reduced speed control the
+/// speed of the tool centre point is at most this. It is no reduced speed control in that standard's sense: that has
+/// to be the controller's own.
 pub const MOST_SPEED_MM_S: f64 = 250.0;
 
 /// A box, base frame, mm.

@@ -1,4 +1,5 @@
-//! How fast the flange goes and turns along a leg, so that no carried point is faster than the leg states; mm/s, degrees/s.
+//! How fast the flange goes and turns along a leg, so that no carried point is faster than the leg states; mm/s,
+//! degrees/s.
 
 use super::super::{Motion, Pace, Way};
 use super::carried::Carried;
@@ -6,8 +7,8 @@ use super::limits::Limits;
 use super::straight::Straight;
 use crate::geometry::{Base, Flange, Rigid};
 
-/// The pace of a leg that begins at `from`. Its fastest point has the leg's speed; where that turns the flange faster than the limit,
-/// everything goes slower together.
+/// The pace of a leg that begins at `from`. Its fastest point has the leg's speed; where that turns the flange faster
+/// than the limit, everything goes slower together.
 pub fn pace(from: &Rigid<Base, Flange>, leg: &Motion, carried: &Carried, limits: &Limits) -> Pace {
     let lever_mm = carried.lever_mm();
     if leg.way == Way::Joint {

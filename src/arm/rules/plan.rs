@@ -56,7 +56,8 @@ pub struct Proposal {
     pub reasons: Vec<String>,
     /// What nobody has judged, in words: no gate stands for it, and whoever confirms has to know.
     pub unjudged: Vec<String>,
-    /// Names this proposal and no other: its poses, speeds, reason and evidence, what the flange carries, and its number.
+    /// Names this proposal and no other: its poses, speeds, reason and evidence, what the flange carries, and its
+    /// number.
     pub hash: String,
     pub(super) shown: Instant,
 }

@@ -6,8 +6,8 @@ use super::tolerances::{ARRIVED, STILL};
 use crate::geometry::{Base, Flange, Rigid};
 use std::time::{Duration, Instant};
 
-/// From the order to the first movement an arm may take so long, or as long as it may stand on its way where that is more: the controller
-/// plans the way and lets go of the brakes.
+/// From the order to the first movement an arm may take so long, or as long as it may stand on its way where that is
+/// more: the controller plans the way and lets go of the brakes.
 pub const START: Duration = Duration::from_millis(1000);
 
 /// The leg that is under way.
@@ -33,9 +33,10 @@ struct Since {
 }
 
 impl Standing {
-    /// Why the arm ought to be moving and is not seen to. A pose has changed where a carried point lies more than 0.01 mm or the flange
-    /// 0.005 degrees from where it was: the slowest leg, 0.1 mm/s, does three times that in 300 ms. The time has to pass by this machine's clock and
-    /// by the controller's: a simulated one may stand still. Within its goal's tolerance an arm may stand: it settles there.
+    /// Why the arm ought to be moving and is not seen to. A pose has changed where a carried point lies more than
+    /// 0.01 mm or the flange 0.005 degrees from where it was: the slowest leg, 0.1 mm/s, does three times that in 300
+    /// ms. The time has to pass by this machine's clock and by the controller's: a simulated one may stand still.
+    /// Within its goal's tolerance an arm may stand: it settles there.
     pub fn judge(&mut self, pose: &TimedPose, leg: Option<&Leg>, carried: &Carried, most: Duration) -> Option<String> {
         let Some(leg) = leg else {
             self.since = None;

@@ -1,4 +1,5 @@
-//! A straight way of the flange that turns evenly, and how fast what rides on the flange moves along it; base frame, mm, rad.
+//! A straight way of the flange that turns evenly, and how fast what rides on the flange moves along it; base frame,
+//! mm, rad.
 
 use crate::geometry::{Base, Flange, Rigid, Vec3, exp, log};
 
@@ -30,8 +31,8 @@ impl Straight {
 
     /// Greatest speed of a point of the flange's frame, mm for each whole way in a unit of time.
     ///
-    /// The point moves with `shift + turn x q`, where `q` turns about the axis. The square of that is a constant and a cosine of the
-    /// angle that was turned: it is greatest where the cosine peaks, or at an end.
+    /// The point moves with `shift + turn x q`, where `q` turns about the axis. The square of that is a constant and
+    /// a cosine of the angle that was turned: it is greatest where the cosine peaks, or at an end.
     pub fn fastest(&self, point: &Vec3) -> f64 {
         let angle = self.turn.norm();
         if angle == 0.0 {
@@ -46,7 +47,7 @@ impl Straight {
         };
         let peak = sine.atan2(cosine);
         let inside = (0.0..=angle).contains(&peak).then(|| speed(peak));
-        // `f64::max` passes over what is no number: a pose that is none has no speed that may be believed.
+        // `f64::max` ignores NaN, so a pose that is not finite would seem to have a speed.
         if speed(0.0).is_nan() { f64::NAN } else { speed(0.0).max(speed(angle)).max(inside.unwrap_or(0.0)) }
     }
 }

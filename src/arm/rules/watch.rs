@@ -1,5 +1,5 @@
-//! In: a motion under way, poses over a connection of its own, the stop button. Out: a Halt over the second connection as soon
-//! as one of them says so, and why.
+//! In: a motion under way, poses over a connection of its own, the stop button. Out: a Halt over the second
+//! connection as soon as one of them says so, and why.
 //! Frame and unit: base frame; mm, mm/s; ms.
 
 use super::super::{Halt, PoseSource, TimedPose};
@@ -19,8 +19,8 @@ pub const LOOK: Duration = Duration::from_millis(2);
 const READ: Duration = Duration::from_millis(4);
 /// Speeds are taken over at least this time, s: controllers state theirs in whole milliseconds.
 pub const SPAN_S: f64 = 0.04;
-/// Measured speeds may be above the confirmed one by this share and this much, mm/s: noise of readings (0.01 mm in [`SPAN_S`] is
-/// 0.25 mm/s), ramps, a stamp that is late by a cycle of 8 ms.
+/// Measured speeds may be above the confirmed one by this share and this much, mm/s: noise of readings (0.01 mm in
+/// [`SPAN_S`] is 0.25 mm/s), ramps, a stamp that is late by a cycle of 8 ms.
 pub const SPEED_SLACK: (f64, f64) = (1.25, 10.0);
 /// The same for turning rates, degrees/s.
 pub const TURN_SLACK: (f64, f64) = (1.25, 2.0);
@@ -183,7 +183,8 @@ impl<'a> Watch<'a> {
         let (speed, most) = (mm / passed, self.confirmed.speed_mm_s * SPEED_SLACK.0 + SPEED_SLACK.1);
         if !(speed <= most) {
             return Some(format!(
-                "{name} moves at {speed:.0} mm/s, limit {most:.0}: the controller's full speed is another than the link was told \
+                "{name} moves at {speed:.0} mm/s, limit {most:.0}: the controller's full speed differs from the one \
+                 stated for the link \
                  (?full=, ?turn=)"
             ));
         }
@@ -191,7 +192,8 @@ impl<'a> Watch<'a> {
         let most = self.confirmed.turn_deg_s * TURN_SLACK.0 + TURN_SLACK.1;
         (!(turning <= most)).then(|| {
             format!(
-                "the flange turns at {turning:.1} degrees/s, limit {most:.1}: the controller's full turning rate is another than \
+                "the flange turns at {turning:.1} degrees/s, limit {most:.1}: the controller's full turning rate \
+                 differs from \
                  the link was told (?turn=)"
             )
         })

@@ -1,5 +1,5 @@
-//! In: stops and their fit. Out: which of them contradict the others, whether the line is bent, whether another order of the counts
-//! fits, and whether any order would.
+//! In: stops and their fit. Out: which of them contradict the others, whether the line is bent, whether another order
+//! of the counts fits, and whether any order would.
 //! Frame and unit: camera frame, mm; squared distances in sigmas (docs/math.md, Axis (7), (8)).
 
 use super::fit::{Order, Stop, StopResidual};
@@ -104,8 +104,8 @@ impl Suspects {
     }
 }
 
-/// Bow over the whole way, from end to middle, mm, and its sigma: what is left of the places over count, squared count beside the
-/// line. A linear axis that is bent and a table that does not run true both leave one.
+/// Bow over the whole way, from end to middle, mm, and its sigma: what is left of the places over count, squared
+/// count beside the line. A linear axis that is bent and a table that does not run true both leave one.
 pub(super) fn bend(seen: &[&Seen], state: &State, scatter: &Scatter) -> [f64; 2] {
     if seen.len() < 4 {
         return [0.0, 0.0];

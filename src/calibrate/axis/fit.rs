@@ -39,13 +39,15 @@ pub struct StopResidual {
 pub struct AxisFit {
     /// The axis as found.
     pub axis: Axis,
-    /// Of dx dy dz pitch and for a turntable px py pz, as [`crate::rig::Kind::parameters`] names them; camera uncertainty included.
+    /// Of dx dy dz pitch and for a turntable px py pz, as [`crate::rig::Kind::parameters`] names them; camera
+    /// uncertainty included.
     pub covariance: DMatrix<f64>,
     /// The same with the camera taken as exact.
     pub covariance_camera_exact: DMatrix<f64>,
     /// One a stop, in the order given.
     pub stops: Vec<StopResidual>,
-    /// What the axis scatters by from stop to stop beyond what pixels explain, per axis: mm, and rad about the board's middle.
+    /// What the axis scatters by from stop to stop beyond what pixels explain, per axis: mm, and rad about the
+    /// board's middle.
     pub sigma_mm: f64,
     /// Scatter of the turn from stop to stop about the board's middle, per axis, rad.
     pub sigma_rad: f64,
@@ -78,9 +80,9 @@ pub struct Order {
 }
 
 impl AxisFit {
-    /// Standard deviation of where a part that rides on the axis is put against where it stood in the middle of the way, rms
-    /// over the stops (on a turntable over a whole turn) and the board's corners, mm: of the axis as a whole, and with its
-    /// scatter from stop to stop and what its way bows by, which is used as straight.
+    /// Standard deviation of where a part that rides on the axis is put against where it stood in the middle of the
+    /// way, rms over the stops (on a turntable over a whole turn) and the board's corners, mm: of the axis as a
+    /// whole, and with its scatter from stop to stop and what its way bows by, which is used as straight.
     pub fn expected_error(&self, covariance: &DMatrix<f64>) -> [f64; 2] {
         let (low, high) =
             self.counts.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), c| (a.min(*c), b.max(*c)));

@@ -1,5 +1,5 @@
-//! In: an axis' fit. Out: the verdict with reasons, figures and the next best picture, and the page a person reads; fit and
-//! verification apart.
+//! In: an axis' fit. Out: the verdict with reasons, figures and the next best picture, and the page a person reads;
+//! fit and verification apart.
 //! Frame and unit: camera frame; mm, degrees.
 
 use super::fit::{AxisFit, StopResidual};
@@ -58,7 +58,8 @@ pub fn judge(fit: &AxisFit, limits: &Limits, board_length: &str) -> Quality {
     let mut j = limits.by_error(
         expected,
         format!(
-            "a point that rides along is put right to {expected:.4} mm (1 sigma) over {over}: {own:.4} mm by direction and pitch, \
+            "a point that rides along is corrected to {expected:.4} mm (1 sigma) over {over}: {own:.4} mm by \
+             direction and pitch, \
              the rest scatters from stop to stop or bows"
         ),
     );
@@ -104,7 +105,8 @@ impl Evidence<'_> {
         });
         if fit.sigma_mm > 0.0 || fit.sigma_rad > 0.0 {
             j.reasons.push(format!(
-                "the axis (or its encoder) scatters by {:.4} mm and {:.4} degrees from stop to stop beyond what pixels explain; every \
+                "the axis (or its encoder) scatters by {:.4} mm and {:.4} degrees from stop to stop beyond what \
+                 pixels explain; every \
                  point's sigma contains it",
                 fit.sigma_mm,
                 fit.sigma_rad.to_degrees()
@@ -168,7 +170,8 @@ fn bow(fit: &AxisFit, tolerance_mm: f64, j: &mut Judgement) {
     // Where a table's error lies farther round than the board was seen, nobody knows.
     j.at_best(Verdict::BadlyDetermined, bent && !linear, || {
         format!(
-            "the table does not run true: over the turn seen, the board's place bows by {bow:.4} mm, {sigma:.4} mm is chance"
+            "the table does not run true: over the turn seen, the board's place bows by {bow:.4} mm, {sigma:.4} mm \
+             is chance"
         )
     });
 }
@@ -181,7 +184,8 @@ fn pitch(fit: &AxisFit, board_length: &str, j: &mut Judgement) {
     let sigma = fit.covariance[(3, 3)].max(0.0).sqrt() / stated;
     j.at_best(Verdict::BadlyDetermined, (ratio - 1.0).abs() > (4.0 * sigma).max(SCALE_TOLERANCE), || {
         format!(
-            "a {unit} of the axis is {ratio:.4} {unit} by the board: the axis states another unit, or {board_length} is wrong"
+            "a {unit} of the axis is {ratio:.4} {unit} by the board: the axis states another unit, or {board_length} \
+             is wrong"
         )
     });
 }
@@ -191,7 +195,8 @@ fn contradictions(fit: &AxisFit, j: &mut Judgement) {
     for s in fit.stops.iter().filter(|s| !s.used) {
         j.at_best(Verdict::Usable, true, || {
             format!(
-                "{} at count {} was left out: the board lies {:.3} mm from where the others predict it (it slipped, or the count is \
+                "{} at count {} was excluded: the board lies {:.3} mm from where the others predict it (it slipped, \
+                 or the count is \
                  another picture's)",
                 s.name, s.count, s.holdout_mm
             )
@@ -206,7 +211,8 @@ fn order(fit: &AxisFit, j: &mut Judgement) {
     let o = &fit.order;
     j.at_best(Verdict::BadlyDetermined, o.spread_mm > BY_CHANCE * o.dealt_mm, || {
         format!(
-            "counts and pictures do not belong together: the stops spread by {:.3} mm about their motion, with counts dealt out at \
+            "counts and pictures do not belong together: the stops spread by {:.3} mm about their motion, with \
+             counts dealt out at \
              random by {:.3} mm",
             o.spread_mm, o.dealt_mm
         )
@@ -220,7 +226,8 @@ fn order(fit: &AxisFit, j: &mut Judgement) {
     });
     let untold = !turned && o.reversed_mm < TOLD * o.spread_mm;
     j.at_best(Verdict::Usable, untold, || {
-        "counts in the reverse order would fit as well, because the stops lie evenly: that they count the right way round is \
+        "counts in the reverse order would fit as well, because the stops lie evenly: that they count the right way \
+         round is \
          taken from the recording"
             .into()
     });
@@ -259,7 +266,7 @@ pub fn page(fit: &AxisFit, quality: &Quality) -> Page {
                 format!("{:.4}", s.mm),
                 format!("{:.4}", s.holdout_mm),
                 format!("{:.1}", s.surprise.sqrt()),
-                if s.used { "used" } else { "left out" }.into(),
+                if s.used { "used" } else { "excluded" }.into(),
             ]
         })
         .collect();
@@ -274,7 +281,7 @@ pub fn page(fit: &AxisFit, quality: &Quality) -> Page {
     for (i, name) in ["x", "y", "z"].iter().enumerate() {
         let points: Vec<(f64, f64)> = fit.stops.iter().filter(|s| s.used).map(|s| (s.count, s.off[i])).collect();
         let caption = format!(
-            "What is left of the board's place along the camera's {name}, over the count: a bow is no straight axis"
+            "What is left of the board's place along the camera's {name}, over the count: a bow is not a straight axis"
         );
         page.figure(&caption, &scatter(&points, "count", "mm"));
     }

@@ -1,5 +1,5 @@
-//! In: a board's poses at stops of a linear axis or turntable, with the counts there. Out: direction and pitch, or the axis of
-//! rotation, by maximum likelihood, with covariance, the axis' own scatter and hold-out errors.
+//! In: a board's poses at stops of a linear axis or turntable, with the counts there. Out: direction and pitch, or
+//! the axis of rotation, by maximum likelihood, with covariance, the axis' own scatter and hold-out errors.
 //! Frame and unit: camera frame, mm, rad, counts (docs/math.md, Axis (1) to (8)).
 
 use super::checks::{self, Suspects};
@@ -32,7 +32,7 @@ impl Default for AxisOptions {
 fn refused(what: String) -> Fault {
     Fault::refused(what)
         .cause("too few stops, an axis that hardly moved, or counts and pictures that do not belong together")
-        .next("show the board at eight or more stops, unevenly apart, along as much of the way as the camera sees")
+        .next("show the board at eight or more stops, unevenly apart, along as much of the travel as the camera sees")
 }
 
 /// Fits the axis. `camera_covariance` is that of the camera's parameters.
@@ -130,7 +130,8 @@ fn settle(seen: &[Seen], first: Start, gate: f64) -> Result<Settled> {
     Ok(settled.expect("at least one round"))
 }
 
-/// Squared distances over their degrees of freedom, and what the variance is multiplied by for being known from few stops.
+/// Squared distances over their degrees of freedom, and what the variance is multiplied by for being known from few
+/// stops.
 fn misfit(chosen: &[&Seen], fit: &Fit, scatter: &Scatter) -> (f64, f64) {
     let freedom = (6 * chosen.len()) as f64 - fit.covariance.nrows() as f64;
     let chi2 = if freedom > 0.0 { fit.cost / freedom } else { 1.0 };

@@ -1,5 +1,6 @@
-//! In: boards at stops, of which some may be wrong. Out: the motion that most of them agree on, those that agree, and how far they
-//! scatter about it. Every pair (on a turntable: neighbours) proposes one; the one that the median stop likes best is taken.
+//! In: boards at stops, of which some may be wrong. Out: the motion that most of them agree on, those that agree, and
+//! how far they scatter about it. Every pair (on a turntable: neighbours) proposes one; the one that the median stop
+//! likes best is taken.
 //! Frame and unit: camera frame, mm, rad, counts (docs/math.md, Axis (5)).
 
 use super::terms::{Scatter, Seen, State};

@@ -1,5 +1,5 @@
-//! In: boards at stops, a motion. Out: where the motion expects each board, how that moves with the unknowns, the least-squares
-//! fit, and how it follows the camera.
+//! In: boards at stops, a motion. Out: where the motion expects each board, how that moves with the unknowns, the
+//! least-squares fit, and how it follows the camera.
 //! Frame and unit: camera frame; the board's middle, mm, and its turn, rad (docs/math.md, Axis (1) to (4)).
 
 use super::fit::Stop;
@@ -8,7 +8,8 @@ use crate::geometry::{Axis, AxisKind, Board, Camera, CountUnit, Mat3, Riding, Ri
 use crate::solve::{End, LmOptions, Problem, Residuals, lm};
 use nalgebra::{DMatrix, Matrix6, Vector6};
 
-/// What the axis itself scatters by from stop to stop: standard deviations per axis of the board's middle, mm, and of its turn, rad.
+/// What the axis itself scatters by from stop to stop: standard deviations per axis of the board's middle, mm, and of
+/// its turn, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scatter {
     pub mm: f64,
@@ -99,8 +100,8 @@ impl State {
     pub fn width(&self) -> usize {
         if self.kind == AxisKind::Linear { 9 } else { 11 }
     }
-    /// d(expected place and turn) over the unknowns: 3 of the motion or 2 of the direction, 2 of the point, the pitch; then 3 of
-    /// the place and 3 of the turn at count 0.
+    /// d(expected place and turn) over the unknowns: 3 of the motion or 2 of the direction, 2 of the point, the
+    /// pitch; then 3 of the place and 3 of the turn at count 0.
     pub fn jacobian(&self, count: f64) -> DMatrix<f64> {
         let n = self.width();
         let mut j = DMatrix::zeros(6, n);

@@ -64,7 +64,7 @@ pub(in crate::calibrate) fn circle(profile: &Profile, radius: f64, o: &BallOptio
     let weak = |what: String| {
         Fault::refused(format!("{}: {what}", profile.name))
             .cause("the line missed the ball, or the diameter is wrong")
-            .next("leave this profile out, and take others through the upper half of the ball")
+            .next("exclude this profile, and take others through the upper half of the ball")
     };
     let found = found.ok_or_else(|| weak(format!("no circle of radius up to {radius:.2} mm in {} points", p.len())))?;
     if found.inliers.len() < 8 {

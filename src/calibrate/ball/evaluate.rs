@@ -90,7 +90,7 @@ pub fn evaluate(
         of.push((profile.name.clone(), start..points.len()));
     }
     let undetermined = || {
-        Fault::refused("the profiles' points tell no ball with this transform")
+        Fault::refused("the profiles' points do not form a ball with this transform")
             .cause("too few profiles, or all through one section of the ball")
             .next("scan the ball from more sides")
     };

@@ -8,7 +8,7 @@ use crate::solve::repeated;
 pub struct Cleaned {
     /// The profiles.
     pub profiles: Vec<Profile>,
-    /// A z that so many points share that it may not be measured, mm.
+    /// The z that most points share, mm. If many points share it, it may stand for "not measured".
     pub suspects: Vec<f64>,
     /// A sentence each.
     pub warnings: Vec<String>,
@@ -29,8 +29,8 @@ pub fn cleaned(mut profiles: Vec<Profile>, missing: Option<f64>) -> Cleaned {
     let found = repeated(profiles.iter().flat_map(|p| &p.points).map(|point| point[1]));
     warnings.extend(found.iter().map(|(z, n)| {
         format!(
-            "{n} of {left} points have exactly the z {z}: if that means 'not measured', give --missing {z}; where the \
-             error is stated they are left out of the points' depth"
+            "{n} of {left} points have exactly the z {z}: if that means 'not measured', give --missing {z}; they \
+             are excluded from the depth of the stated error"
         )
     }));
     Cleaned { profiles, suspects: found.into_iter().map(|f| f.0).collect(), warnings }

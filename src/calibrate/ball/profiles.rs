@@ -23,7 +23,7 @@ pub fn load(path: &Path) -> Result<Vec<Profile>> {
         .collect();
     files.sort_by_key(|p| natural(&p.file_name().unwrap_or_default().to_string_lossy()));
     if files.is_empty() {
-        return Err(Fault::input(format!("{}: holds no profiles (csv, txt, yml, yaml, json)", path.display()))
+        return Err(Fault::input(format!("{}: contains no profiles (csv, txt, yml, yaml, json)", path.display()))
             .cause("another folder")
             .next("give the folder with one profile a file, or one file with all"));
     }
@@ -102,7 +102,7 @@ pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
         let Columns::Point { profile, x, z } = *columns.as_ref().expect("set above") else {
             let numbers = cells.iter().map(|c| c.parse()).collect::<std::result::Result<Vec<f64>, _>>();
             let name = format!("{stem} line {number}");
-            let points = by_turns(&numbers.map_err(|_| bad("is no row of numbers"))?, &name)?;
+            let points = by_turns(&numbers.map_err(|_| bad("is not a row of numbers"))?, &name)?;
             out.push(Profile {
                 name,
                 points: points.into_iter().filter(|p| p.iter().all(|v| v.is_finite())).collect(),
@@ -110,7 +110,7 @@ pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
             continue;
         };
         let cell = |i: usize| cells.get(i).map(String::as_str).ok_or_else(|| bad("is too short"));
-        let value = |i: usize| cell(i).and_then(|c| c.parse::<f64>().map_err(|_| bad("is no row of numbers")));
+        let value = |i: usize| cell(i).and_then(|c| c.parse::<f64>().map_err(|_| bad("is not a row of numbers")));
         let point = [value(x)?, value(z)?];
         let name = match profile {
             Some(i) => format!("{stem} {}", cell(i)?),
@@ -176,7 +176,7 @@ fn matrix(body: &str) -> std::result::Result<Vec<[f64; 2]>, String> {
         .filter(|t| !t.is_empty())
         .map(value)
         .collect::<Option<Vec<f64>>>()
-        .ok_or_else(|| "holds something that is no number".to_owned())?;
+        .ok_or_else(|| "holds something that is not a number".to_owned())?;
     let wanted = rows.checked_mul(cols).and_then(|n| n.checked_mul(channels));
     if wanted != Some(numbers.len()) {
         return Err(format!("{} numbers for {rows}x{cols} of {channels} channels", numbers.len()));
@@ -185,7 +185,7 @@ fn matrix(body: &str) -> std::result::Result<Vec<[f64; 2]>, String> {
         (_, 2, 1) if rows != 2 => numbers.chunks(2).map(|c| [c[0], c[1]]).collect(),
         (2, n, 1) if n != 2 => (0..n).map(|k| [numbers[k], numbers[n + k]]).collect(),
         (_, _, 2) if rows == 1 || cols == 1 => numbers.chunks(2).map(|c| [c[0], c[1]]).collect(),
-        _ => return Err(format!("{rows}x{cols} of {channels} channels is no list of x, z")),
+        _ => return Err(format!("{rows}x{cols} of {channels} channels is not a list of x, z")),
     })
 }
 

@@ -102,7 +102,7 @@ fn sequences(text: &str) -> Result<Vec<Sequence>> {
                         key = word.trim_end_matches(':').to_owned();
                     }
                 }
-                number => numbers.push(value(number).ok_or_else(|| bad(&format!("'{number}' is no number")))?),
+                number => numbers.push(value(number).ok_or_else(|| bad(&format!("'{number}' is not a number")))?),
             }
         }
     }

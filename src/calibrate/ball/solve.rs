@@ -210,7 +210,10 @@ fn side_of(items: &[Item<'_>], s: &State) -> Side {
 fn undetermined() -> Fault {
     Fault::refused("the sensor's pose on the flange is not determined by these profiles")
         .cause("the flange turned about fewer than two axes, or the ball was always at the same place of the line")
-        .next("scan the ball with the flange tilted by 20 degrees and more about two axes, at both ends of the line and at several distances")
+        .next(
+            "scan the ball with the flange tilted by 20 degrees and more about two axes, at both ends of the line \
+               and at several distances",
+        )
 }
 
 /// All profiles of one ball.
@@ -234,8 +237,8 @@ impl Data<'_> {
         used.map(|i| self.items[i]).collect()
     }
 
-    /// The robust fit with the ball on one side that costs least. A start of one side may end on the other where the ball is
-    /// seen from both: all are tried for each.
+    /// The robust fit with the ball on one side that costs least. A start of one side may end on the other where the
+    /// ball is seen from both: all are tried for each.
     fn best_start(&self, side: Side, point: f64) -> Option<Solved> {
         let rough = Noise { point, robot: 0.5 };
         [Side::Plus, Side::Minus]
@@ -305,7 +308,8 @@ impl Solution {
         self.used.iter().copied().max_by(|&a, &b| d(a).total_cmp(&d(b)))
     }
 
-    /// Refuses a pose that is known to a fifth of the ball's radius or worse; turns count at a reach of 50 mm or the radius.
+    /// Refuses a pose that is known to a fifth of the ball's radius or worse; turns count at a reach of 50 mm or the
+    /// radius.
     fn determined(&self, radius: f64) -> Result<()> {
         let c = &self.solved.covariance;
         let largest_sigma =
@@ -406,22 +410,25 @@ fn told_side(data: &Data<'_>, mut sides: Vec<Solution>) -> Result<(Solution, f64
         [_] => f64::INFINITY,
         [a, b, ..] => data.misfit(&b.solved, &a.noise) - data.misfit(&a.solved, &a.noise),
     };
-    let found = match data.o.side {
-        Some(wanted) => sides.into_iter().find(|s| s.side == wanted).ok_or_else(|| {
-            Fault::refused(format!("no solution has the ball on the side that was stated ({wanted:?})"))
-                .cause("the side is counted along the sensor's y axis: y = z × x")
-                .next("check the direction of the sensor's x axis, or leave the side to the data")
-        })?,
-        None if margin < data.o.clear => {
-            return Err(Fault::refused(format!(
-                "the data does not tell on which side of the profile plane the ball lies: the other side fits worse by {margin:.1} only, {} are needed",
+    let found =
+        match data.o.side {
+            Some(wanted) => sides.into_iter().find(|s| s.side == wanted).ok_or_else(|| {
+                Fault::refused(format!("no solution has the ball on the stated side ({wanted:?})"))
+                    .cause("the side is counted along the sensor's y axis: y = z × x")
+                    .next("check the direction of the sensor's x axis, or leave the side to the data")
+            })?,
+            None if margin < data.o.clear => {
+                return Err(Fault::refused(format!(
+                "the data does not show on which side of the profile plane the ball is: the other side fits worse by \
+                 {margin:.1} only, {} are needed",
                 data.o.clear
             ))
             .cause("the profiles all pass near the ball's middle, or the poses are too alike")
-            .next("state it with --side plus or --side minus (y = z × x of the sensor), or add poses with other tilts"));
-        }
-        None => sides.swap_remove(0),
-    };
+            .next("state it with --side plus or --side minus (y = z × x of the sensor), or add poses with other \
+                   tilts"));
+            }
+            None => sides.swap_remove(0),
+        };
     Ok((found, margin))
 }
 

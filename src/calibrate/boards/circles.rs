@@ -26,7 +26,7 @@ type Node = (i32, i32);
 /// Finds a grid that is wholly in view; dark dots on bright or bright ones on dark.
 pub fn find(image: &Image, board: &BoardSpec, _options: &FindOptions) -> Result<BoardView> {
     let BoardSpec::Circles { dots: [nx, ny], asymmetric, diameter_mm, .. } = board else {
-        return Err(Fault::usage("the board is no circle grid").next("describe it as type circles"));
+        return Err(Fault::usage("the board is not a circle grid").next("describe it as type circles"));
     };
     let grey = Grey::new(image);
     let features = board.features();

@@ -118,8 +118,9 @@ fn keep_agreeing(seen: &mut Vec<Seen>, features: &[Vec2]) {
         off_px(seen, features, i)[3] / (s.corners[0].pixel - s.corners[2].pixel).norm()
     };
     let good: Vec<bool> = (0..seen.len()).map(|i| off(i) < 0.4).collect();
-    // A wrong neighbour spoils good ones, so that one marker's word is not enough; but where most disagree none is believed. Some
-    // markers are their own mirror image (DICT_4X4_50: 8, 9, 17) and are read in a mirrored picture, each the wrong way round.
+    // A wrong neighbour spoils good ones, so that one marker's word is not enough; but where most disagree none is
+    // believed. Some markers are their own mirror image (DICT_4X4_50: 8, 9, 17) and are read in a mirrored picture,
+    // each the wrong way round.
     if good.iter().filter(|g| **g).count() * 2 <= seen.len() {
         seen.clear();
         return;
@@ -129,8 +130,8 @@ fn keep_agreeing(seen: &mut Vec<Seen>, features: &[Vec2]) {
     drop_covered(seen, features);
 }
 
-/// How far a marker's corners are from where the three markers nearest on the board put them, px, ascending: a lens bends less
-/// over so short a way.
+/// How far a marker's corners are from where the three markers nearest on the board put them, px, ascending: a lens
+/// bends less over so short a way.
 fn off_px(seen: &[Seen], features: &[Vec2], i: usize) -> [f64; 4] {
     let middle = |s: &Seen| features[4 * s.place] + features[4 * s.place + 2];
     let mut others: Vec<usize> = (0..seen.len()).filter(|k| *k != i).collect();
@@ -150,8 +151,8 @@ fn off_px(seen: &[Seen], features: &[Vec2], i: usize) -> [f64; 4] {
     off
 }
 
-/// Drops, worst first, markers of which a corner stands out against what their neighbours say, and against their own other
-/// corners: something covers it. A lens, or a neighbour that is wrong itself, puts all four off.
+/// Drops, worst first, markers of which a corner stands out against what their neighbours say, and against their own
+/// other corners: something covers it. A lens, or a neighbour that is wrong itself, puts all four off.
 fn drop_covered(seen: &mut Vec<Seen>, features: &[Vec2]) {
     while seen.len() > 4 {
         let off: Vec<[f64; 4]> = (0..seen.len()).map(|i| off_px(seen, features, i)).collect();
@@ -166,8 +167,8 @@ fn drop_covered(seen: &mut Vec<Seen>, features: &[Vec2]) {
     }
 }
 
-/// Times the middle marker's distance from where its neighbours put it, with the least such distance that is believed, px; and
-/// times the marker's own second best corner's: two of the four may be covered.
+/// Times the middle marker's distance from where its neighbours put it, with the least such distance that is
+/// believed, px; and times the marker's own second best corner's: two of the four may be covered.
 const STANDS_OUT: f64 = 4.0;
 const LEAST_OFF_PX: f64 = 0.25;
 const AGAINST_OWN: f64 = 6.0;

@@ -115,7 +115,8 @@ fn fits(board: &BoardSpec) -> Result<()> {
             let least = 0.15 * marker_mm;
             bad(
                 format!(
-                    "gaps of {gap_mm} mm and a border of {border_mm} mm leave too little white round markers of {marker_mm} mm: at least {least} mm"
+                    "gaps of {gap_mm} mm and a border of {border_mm} mm leave too little white round markers of \
+                     {marker_mm} mm: at least {least} mm"
                 ),
                 "choose gaps and a border of a fifth to half of the marker",
             )
@@ -198,7 +199,8 @@ impl Sheet {
         }
         let _ = writeln!(
             out,
-            "<text x=\"{:.2}\" y=\"{:.2}\" text-anchor=\"middle\" font-family=\"sans-serif\" font-size=\"2.6\">{}</text></svg>",
+            "<text x=\"{:.2}\" y=\"{:.2}\" text-anchor=\"middle\" font-family=\"sans-serif\" \
+             font-size=\"2.6\">{}</text></svg>",
             w / 2.0,
             h - 8.5,
             self.label
@@ -232,7 +234,8 @@ impl Sheet {
             "<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>".to_string(),
             "<< /Type /Pages /Kids [3 0 R] /Count 1 >>".into(),
             format!(
-                "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {:.4} {:.4}] /Contents 4 0 R /Resources << /Font << /F1 5 0 R >> >> >>",
+                "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {:.4} {:.4}] /Contents 4 0 R /Resources << /Font << /F1 \
+                 5 0 R >> >> >>",
                 self.width * k,
                 self.height * k
             ),

@@ -86,8 +86,8 @@ fn area(p: &[Vec2]) -> f64 {
     (0..n).map(|i| p[i].x * p[(i + 1) % n].y - p[i].y * p[(i + 1) % n].x).sum::<f64>() / 2.0
 }
 
-/// The four corners of a hull that is one. Pixels cut corners off: each is two of the hull's points or three, and the longest edge
-/// between one corner's and the next one's is the side, which is carried on to where the sides meet.
+/// The four corners of a hull that is one. Pixels cut corners off: each is two of the hull's points or three, and the
+/// longest edge between one corner's and the next one's is the side, which is carried on to where the sides meet.
 fn quadrilateral(hull: &[Vec2]) -> Option<[Vec2; 4]> {
     let near = largest(hull)?;
     let sides: [[Vec2; 2]; 4] = std::array::from_fn(|k| {
@@ -116,8 +116,8 @@ fn meet(a: &[Vec2; 2], b: &[Vec2; 2]) -> Option<Vec2> {
     (cross.abs() > 0.01 * u.norm() * v.norm()).then(|| a[0] + u * ((between.x * v.y - between.y * v.x) / cross))
 }
 
-/// Which four of a convex hull's points enclose most: of every diagonal, the point farthest from it on each side. That point moves
-/// on with the diagonal's end, so that all of it takes as many steps as there are diagonals.
+/// Which four of a convex hull's points enclose most: of every diagonal, the point farthest from it on each side.
+/// That point moves on with the diagonal's end, so that all of it takes as many steps as there are diagonals.
 fn largest(hull: &[Vec2]) -> Option<[usize; 4]> {
     let n = hull.len();
     let (mut best, mut most) = (None, 0.0);

@@ -76,8 +76,9 @@ const PARAMETERS: usize = 9;
 const RIM: f64 = 5.0;
 
 /// Fits two blurred edges that cross: I = (1 + g·x) (m + c E(d₁) E(d₂)) with d the signed
-/// distances from the edges and E a step blurred by a Gaussian and by the pixel. The pattern is symmetric about the corner for any symmetric blur, so
-/// that an imperfect blur model does not shift it. `u` and `v` are the steps to the next corners, px.
+/// distances from the edges and E a step blurred by a Gaussian and by the pixel. The pattern is symmetric about the
+/// corner for any symmetric blur, so that an imperfect blur model does not shift it. `u` and `v` are the steps to the
+/// next corners, px.
 pub fn corner(grey: &Grey, start: &Vec2, u: &Vec2, v: &Vec2, window: &Window) -> Option<Corner> {
     let to_grid = nalgebra::Matrix2::from_columns(&[*u, *v]).try_inverse()?;
     let (lu, lv) = (u.norm(), v.norm());
@@ -113,8 +114,8 @@ pub fn corner(grey: &Grey, start: &Vec2, u: &Vec2, v: &Vec2, window: &Window) ->
     })
 }
 
-/// Model value and derivatives at (x, y); `widths` are the pixel's widths across the edges. Parameters: corner x y, edge angles 1 2, ln blur, mean m,
-/// contrast c, gain slopes gx gy.
+/// Model value and derivatives at (x, y); `widths` are the pixel's widths across the edges. Parameters: corner x y,
+/// edge angles 1 2, ln blur, mean m, contrast c, gain slopes gx gy.
 fn model(p: &[f64; PARAMETERS], widths: &[f64; 2], x: f64, y: f64, j: &mut [f64; PARAMETERS]) -> f64 {
     let (dx, dy) = (x - p[0], y - p[1]);
     let (s1, c1) = p[2].sin_cos();

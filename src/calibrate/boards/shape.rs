@@ -1,4 +1,5 @@
-//! In: a board's features as drawn, coefficients. Out: where the features of the board that was printed and mounted are.
+//! In: a board's features as drawn, coefficients. Out: where the features of the board that was printed and mounted
+//! are.
 //! Frame and unit: board frame; mm. docs/math.md, Camera calibration (12).
 
 use crate::geometry::{Vec2, Vec3};
@@ -8,7 +9,8 @@ const DEGREE: usize = 5;
 /// Terms that keep their degree: a stretch along x against y, and a shear.
 const LINEAR: usize = 2;
 
-/// The ways in which a board may differ from its drawing: smooth ones, that no place of the board and no scale of the drawing stand for.
+/// The ways in which a board may differ from its drawing: smooth ones, that no place of the board and no scale of the
+/// drawing stand for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Basis {
     middle: Vec2,

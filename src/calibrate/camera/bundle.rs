@@ -35,8 +35,8 @@ impl Bent {
     }
 }
 
-/// Usual size of the rational terms. Numerator and denominator bend nearly alike: without it a solve walks along what they cancel
-/// until a pole stands at the picture's rim.
+/// Usual size of the rational terms. Numerator and denominator bend nearly alike: without it a solve walks along what
+/// they cancel until a pole stands at the picture's rim.
 const RATIONAL_SIGMA: f64 = 2.0;
 
 pub(in crate::calibrate) struct Bundle<'a> {

@@ -1,5 +1,5 @@
-//! In: boards' features in pictures, the parameters that are held. Out: camera, board's shape and boards' poses that explain them best,
-//! and how far the camera is known.
+//! In: boards' features in pictures, the parameters that are held. Out: camera, board's shape and boards' poses that
+//! explain them best, and how far the camera is known.
 //! Frame and unit: camera_from_board, mm, rad; px (docs/math.md, Camera calibration (7), (9)).
 
 use super::bundle::{Bent, Bundle, Corner, State};

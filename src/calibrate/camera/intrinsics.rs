@@ -46,8 +46,8 @@ pub struct SolveOptions {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
 #[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Boards {
-    /// As drawn, unless all pictures show one board and those that were held out fit better with a shape that is estimated beside the
-    /// camera ([`Shape`]). It is said.
+    /// As drawn, unless all pictures show one board and those that were held out fit better with a shape that is
+    /// estimated beside the camera ([`Shape`]). It is said.
     #[default]
     Evidence,
     /// As drawn.
@@ -84,8 +84,8 @@ pub struct Solved {
     /// Of the intrinsic parameters (order: [`crate::camera::NAMES`]), zero rows for held ones; the residuals'
     /// own scale is in it, and how the pictures repeat. `None` where something is not determined.
     pub covariance: Option<ParameterMatrix>,
-    /// By how much more the parameters scatter from picture to picture than corners that err by themselves would make them:
-    /// factors on the standard deviations, in the covariance already; 1 and more.
+    /// By how much more the parameters scatter from picture to picture than corners that err by themselves would make
+    /// them: factors on the standard deviations, in the covariance already; 1 and more.
     pub repeat: Parameters,
     /// Held at their value, indices into [`crate::camera::NAMES`].
     pub held: Vec<usize>,
@@ -166,8 +166,11 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
 
 fn unsolved() -> Fault {
     Fault::refused("the camera could not be solved")
-        .cause("the corners contradict each other, or do not determine so many lens terms")
-        .next("look at the pictures and leave out those where the board was misread; ask for fewer lens terms (--lens five)")
+        .cause("the corners contradict each other, or do not determine this number of lens terms")
+        .next(
+            "look at the pictures and exclude those where the board was misread; ask for fewer lens terms (--lens \
+               five)",
+        )
 }
 
 /// The ways in which the board may differ from its drawing, where all pictures show the same one.
@@ -189,7 +192,7 @@ fn see(name: &str, points: &[Corner]) -> Result<Seen> {
     let homography = (points.len() >= 6).then(|| homography(&plane, &pixels)).flatten().ok_or_else(|| {
         Fault::refused(format!("{name}: the {} corners seen do not determine the board's place", points.len()))
             .cause("fewer than 6 corners, or all on one line")
-            .next("leave this picture out, or take it again with more of the board in view")
+            .next("exclude this picture, or take it again with more of the board in view")
     })?;
     Ok(Seen { plane, pixels, homography })
 }

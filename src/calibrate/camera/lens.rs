@@ -1,5 +1,5 @@
-//! In: corners of a board in several pictures. Out: which of the lens's terms they determine: named by a person, or chosen by
-//! what the pictures tell (docs/math.md, Camera calibration (8)).
+//! In: corners of a board in several pictures. Out: which of the lens's terms they determine: named by a person, or
+//! chosen by what the pictures tell (docs/math.md, Camera calibration (8)).
 //! Frame and unit: indices into `camera::NAMES`.
 
 use crate::camera::{LENS, NAMES, SKEW};
@@ -8,8 +8,8 @@ use crate::camera::{LENS, NAMES, SKEW};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
 #[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Lens {
-    /// k1 k2 p1 p2 k3; terms that the pictures do not determine are held at zero, and one of the families below is taken in where
-    /// pictures that it was not solved from fit better with it. Either is said.
+    /// k1 k2 p1 p2 k3; terms that the pictures do not determine are held at zero, and one of the families below is
+    /// taken in where pictures that it was not solved from fit better with it. Either is said.
     #[default]
     Evidence,
     /// A pinhole.

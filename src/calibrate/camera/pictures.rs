@@ -1,5 +1,5 @@
-//! In: recordings of boards that one camera took. Out: the boards' corners, picture by picture, why the others have none,
-//! and the hashes of what went in.
+//! In: recordings of boards that one camera took. Out: the boards' corners, picture by picture, why the others have
+//! none, and the hashes of what went in.
 //! Frame and unit: px.
 
 use super::intrinsics::Observation;
@@ -25,7 +25,8 @@ impl Source<'_> {
     }
 }
 
-/// Looks for the board in one picture; `white` is the colour of its first square where its description leaves that open.
+/// Looks for the board in one picture; `white` is the colour of its first square where its description leaves that
+/// open.
 fn look(source: &Source<'_>, white: Option<bool>, options: &FindOptions) -> Result<Observation> {
     let board = source.recording.meta.board_of(source.frame).ok_or_else(no_board)?;
     let known = white.map_or_else(|| board.clone(), |white| board.beginning(white));
@@ -72,7 +73,7 @@ pub(in crate::calibrate) fn one_size(recordings: &[Recording]) -> Result<(u32, u
             size(other).1
         ))
         .cause("two cameras, or one at two resolutions")
-        .next("calibrate each camera and resolution by itself")),
+        .next("calibrate each camera and resolution separately")),
     }
 }
 
@@ -119,7 +120,7 @@ pub(in crate::calibrate) fn pictures(
         let first = hash.as_ref().and_then(|h| known.get(h));
         if let (Some(first), Ok(_)) = (first, &seen) {
             let again = Fault::refused(format!("it is the same picture as {first}"))
-                .cause("a copied picture: its board is parallel to the first one's and tells nothing new")
+                .cause("a copied picture: its board is parallel to the first one's and adds no information")
                 .next("take a picture of the board at another tilt instead");
             left_out.push((name, again));
             continue;

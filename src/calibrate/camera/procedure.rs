@@ -51,7 +51,7 @@ pub struct CameraResult {
     pub used: Vec<Observation>,
     /// The camera with every board's pose and every corner's residual.
     pub solved: Solved,
-    /// Pictures left out: name and reason.
+    /// Excluded pictures: name and reason.
     pub left_out: Vec<(String, String)>,
     /// Leave-one-out rms of each used picture, px.
     pub hold_out_px: Vec<Option<f64>>,
@@ -90,7 +90,7 @@ const OUTLIER_PICTURE: f64 = 3.5;
 struct Agreed {
     pictures: Vec<Observation>,
     solved: Solved,
-    /// Pictures left out: name and reason.
+    /// Excluded pictures: name and reason.
     left_out: Vec<(String, String)>,
     /// More than a quarter of the pictures would have to go.
     contradiction: bool,
@@ -120,8 +120,8 @@ pub fn from_observations(
     Ok(CameraResult { calibration, used: pictures, solved, left_out, hold_out_px, worst })
 }
 
-/// Solves, and sets aside what does not fit: one picture at a time, the worst first, because a wrong one bends the others'
-/// residuals too.
+/// Solves, and sets aside what does not fit: one picture at a time, the worst first, because a wrong one bends the
+/// others' residuals too.
 fn agree(
     mut pictures: Vec<Observation>,
     mut left_out: Vec<(String, String)>,
@@ -236,7 +236,8 @@ fn judge(
     evidence.fits(&mut j);
     j.reasons.extend(pictures.iter().find(|o| o.view.begins_white).map(|o| {
         format!(
-            "{}: the ChArUco board begins with a white square, as OpenCV drew boards before version 4.6 (\"legacy pattern\")",
+            "{}: the ChArUco board begins with a white square, as OpenCV drew boards before version 4.6 (\"legacy \
+             pattern\")",
             o.name
         )
     }));
@@ -248,21 +249,23 @@ fn judge(
         let off = format!("its features are {flat:.3} mm off in its plane and {lifted:.3} mm out of it (rms)");
         if told {
             format!(
-                "the board is not as drawn: {off}; its shape was estimated with the camera, pictures that were not solved from fit \
+                "the board is not as drawn: {off}; its shape was estimated with the camera, pictures that were not \
+                 solved from fit \
                  better with it"
             )
         } else {
             format!("the board's shape was estimated with the camera, as was asked: {off}")
         }
     }));
-    j.reasons.extend(agreed.left_out.iter().map(|(name, why)| format!("{name} was left out: {why}")));
+    j.reasons.extend(agreed.left_out.iter().map(|(name, why)| format!("{name} was excluded: {why}")));
     if let Some((name, id, r)) = worst.first() {
         j.reasons.push(format!("worst corner: {name}, feature {id}, {r:.2} px ({} stand out)", worst.len()));
     }
     let noise = rms(solved.residuals.iter().flatten().map(|r| r.0.norm())) / std::f64::consts::SQRT_2;
     j.advice = advise(pictures, solved, distance, noise, expected, j.verdict);
     j.advice.extend(shape.filter(|_| told).map(|_| {
-        "calibrate hand-eye, laser plane and pointer with a flatter board (print on glass or aluminium): they take it as drawn"
+        "calibrate hand-eye, laser plane and pointer with a flatter board (print on glass or aluminium): they take \
+         it as drawn"
             .to_string()
     }));
     let per_picture = pictures
@@ -284,7 +287,8 @@ impl Evidence<'_> {
         j.at_best(Verdict::Usable, (3..8).contains(&pictures), || format!("only {pictures} pictures"));
         j.at_best(Verdict::BadlyDetermined, tilt < 10.0, || {
             format!(
-                "all boards are parallel within {tilt:.1} degrees; 10 are needed: focal length and distance cannot be told apart"
+                "all boards are parallel within {tilt:.1} degrees; 10 are needed: focal length and distance cannot \
+                 be separated"
             )
         });
         j.at_best(Verdict::BadlyDetermined, expected > 0.5, || {
@@ -358,7 +362,8 @@ impl Evidence<'_> {
     }
 }
 
-/// By how much the board departs from its drawing, mm rms, in its plane and out of it; `None` where it was taken as drawn.
+/// By how much the board departs from its drawing, mm rms, in its plane and out of it; `None` where it was taken as
+/// drawn.
 fn board_shape(pictures: &[Observation], solved: &Solved) -> Option<[f64; 2]> {
     Some(solved.shape.as_ref()?.departs(&pictures.first()?.features))
 }
@@ -396,6 +401,10 @@ fn advise(
             vec![format!("{}; expected ray error {expected:.3} -> {:.3} px", next.words, next.expected_px)]
         }
         Some(_) => Vec::new(),
-        None => vec!["tilt the board by 20 to 40 degrees about the horizontal axis in one picture and about the vertical axis in another, in different corners of the picture".into()],
+        None => vec![
+            "tilt the board by 20 to 40 degrees about the horizontal axis in one picture and about the \
+                      vertical axis in another, in different corners of the picture"
+                .into(),
+        ],
     }
 }

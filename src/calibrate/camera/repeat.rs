@@ -1,5 +1,5 @@
-//! In: a camera solved from several pictures. Out: how much worse its numbers repeat from picture to picture than the corners' noise
-//! says: one factor on each standard deviation.
+//! In: a camera solved from several pictures. Out: how much worse its numbers repeat from picture to picture than the
+//! corners' noise says: one factor on each standard deviation.
 //! Frame and unit: the camera's parameters (order: [`crate::camera::NAMES`]). docs/math.md, Camera calibration (9).
 
 use super::bundle::{Bundle, State};
@@ -15,9 +15,10 @@ const LEVERAGE: f64 = 0.99;
 /// Information on the free parameters from one picture whose pose is unknown, and its pull on them.
 type Told = (DMatrix<f64>, DVector<f64>);
 
-/// Corners of one picture are not independent: blur, light and the board's bending move them together. So pictures are taken as the
-/// things that repeat: each one's pull on the solution, corrected for its own weight in it \[bell02\], against what corners that err
-/// by themselves would pull. Never below 1. `None` for fewer than 3 pictures, or where something is not determined.
+/// Corners of one picture are not independent: blur, light and the board's bending move them together. So pictures
+/// are taken as the things that repeat: each one's pull on the solution, corrected for its own weight in it
+/// \[bell02\], against what corners that err by themselves would pull. Never below 1. `None` for fewer than 3
+/// pictures, or where something is not determined.
 pub(super) fn repeat(bundle: &Bundle<'_>, solution: &Solution<State>) -> Option<Parameters> {
     let told = each(bundle, solution)?;
     let (n, p) = (told.len() as f64, bundle.free.len());
@@ -52,7 +53,8 @@ pub(super) fn repeat(bundle: &Bundle<'_>, solution: &Solution<State>) -> Option<
     Some(out)
 }
 
-/// A picture's pull where all together have unit information (`root` of the covariance): (1 - W)^-1/2 u, W its share of that.
+/// A picture's pull where all together have unit information (`root` of the covariance): (1 - W)^-1/2 u, W its share
+/// of that.
 fn pulled((own, pull): &Told, root: &DMatrix<f64>) -> DVector<f64> {
     let share = (root.transpose() * own * root).symmetric_eigen();
     let free = share.eigenvalues.map(|w| 1.0 / (1.0 - w.clamp(0.0, LEVERAGE)).sqrt());

@@ -39,7 +39,7 @@ pub fn page(result: &CameraResult, title: &str) -> Page {
     page.table("Boards", &["picture", "corners", "x mm", "y mm", "z mm", "tilt degrees"], &boards(result));
     let left: Vec<Vec<String>> = result.left_out.iter().map(|(n, why)| vec![n.clone(), why.clone()]).collect();
     if !left.is_empty() {
-        page.table("Pictures left out", &["picture", "why"], &left);
+        page.table("Excluded pictures", &["picture", "why"], &left);
     }
     page
 }
@@ -104,7 +104,8 @@ fn draw_shape(page: &mut Page, result: &CameraResult, shape: &Shape) {
     let off: Vec<Vec3> = features.iter().map(|x| shape.place(x) - x).collect();
     let far = off.iter().fold([0.0, 0.0], |[flat, high]: [f64; 2], d| [flat.max(d.xy().norm()), high.max(d.z.abs())]);
     page.paragraph(&format!(
-        "Smooth departures of the board's features from its drawing were estimated beside the camera: up to {:.3} mm in its plane, \
+        "Smooth departures of the board's features from its drawing were estimated beside the camera: up to {:.3} mm \
+         in its plane, \
          up to {:.3} mm out of it (along its z axis). A scale of the whole board cannot be seen.",
         far[0], far[1]
     ));

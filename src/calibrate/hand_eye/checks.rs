@@ -52,19 +52,24 @@ pub fn before(pairs: &[Pair], o: &HandEyeOptions) -> Result<()> {
     if second < o.min_second_axis_deg {
         let axis = spread[0].0;
         return Err(Fault::refused(format!(
-            "the poses turn about one axis only: {first:.1} degrees rms about ({:.2}, {:.2}, {:.2}) of the camera's carrier, \
+            "the poses turn about one axis only: {first:.1} degrees rms about ({:.2}, {:.2}, {:.2}) of the camera's \
+             carrier, \
              {second:.2} degrees about the next axis, {} are needed",
             axis.x, axis.y, axis.z, o.min_second_axis_deg
         ))
-        .cause("with one axis of rotation the camera's place along that axis cannot be told")
-        .next("tilt the flange about an axis at right angles to the first by 20 degrees or more and take more pictures"));
+        .cause("with one axis of rotation the camera's position along that axis is not determined")
+        .next(
+            "tilt the flange about an axis at right angles to the first by 20 degrees or more and take more \
+               pictures",
+        ));
     }
     Ok(())
 }
 
 /// Poses dealt out at random fit a chain too, badly. Pairs whose misfit is above this share of the best of
 /// [`DEALS`] random deals fit by chance: 1200 shuffled sets of 6 to 25 pairs come out at 0.56 and more, robots
-/// that scatter by 2 mm and 1 degree at 0.33 and less, and once of 1200 more at 0.47 (tests/calibrate/hand_eye_judge.rs, its long form).
+/// that scatter by 2 mm and 1 degree at 0.33 and less, and once of 1200 more at 0.47
+/// (tests/calibrate/hand_eye_judge.rs, its long form).
 const BY_CHANCE: f64 = 0.5;
 const DEALS: u64 = 20;
 /// Below this share no other order of the poses is looked for.
@@ -97,8 +102,9 @@ pub fn after(pairs: &[Pair], fit: &HandEyeFit, o: &HandEyeOptions) -> Result<()>
     let agree = chance <= BY_CHANCE && used * 10 >= pairs.len() * 6 && used >= o.min_pairs;
     if !agree || (chance > SURELY && other_order(pairs, o).is_some()) {
         let what = format!(
-            "pictures and robot poses do not belong together: {used} of {} pairs agree, the robot would scatter by {:.2} mm and \
-             {:.3} degrees; their misfit is {:.0} % of that of poses dealt out at random (limit {:.0} %)",
+            "pictures and robot poses do not belong together: {used} of {} pairs agree, the robot would scatter by \
+             {:.2} mm and \
+             {:.3} degrees; the misfit is {:.0} % of that of random pairs (limit {:.0} %)",
             pairs.len(),
             fit.noise.robot_mm,
             fit.noise.robot_rad.to_degrees(),

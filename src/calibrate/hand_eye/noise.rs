@@ -56,8 +56,8 @@ fn components(
     Some(out)
 }
 
-/// The model of a chain's residuals without its parts, and the parts of the robot's places, its turns and the boards for a
-/// variance of 1.
+/// The model of a chain's residuals without its parts, and the parts of the robot's places, its turns and the boards
+/// for a variance of 1.
 fn model(
     pairs: &[&Pair],
     chain: &Chain,
@@ -138,7 +138,8 @@ pub(in crate::calibrate) fn fit(
             break;
         }
     }
-    // That the rounds ran out says nothing against the chain: of a robot too exact to be seen the noise shrinks on and on.
+    // That the rounds ran out says nothing against the chain: of a robot too exact to be seen the noise shrinks on
+    // and on.
     let refined = refine(pairs, &chain, &noise, mount, &camera.belief)?;
     Some(Fitted { refined, noise, camera })
 }

@@ -1,4 +1,5 @@
-//! In: what a person may choose about a hand-eye solve. Out: the choice, checked; where the camera is mounted; the noise that is assumed.
+//! In: what a person may choose about a hand-eye solve. Out: the choice, checked; where the camera is mounted; the
+//! noise that is assumed.
 //! Frame and unit: mm, degrees where the name says so.
 
 use super::closed::{Chain, Far, Near};

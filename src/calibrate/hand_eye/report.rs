@@ -94,7 +94,7 @@ impl Evidence<'_> {
             let whose = belongs_to(self.pairs, self.fit, i);
             let whose = whose.map_or(String::new(), |n| format!("; its picture fits the pose of {n}"));
             j.at_best(Verdict::Usable, true, || {
-                format!("{} was left out: its pose and picture disagree by {:.2} mm{whose}", r.name, r.mm)
+                format!("{} was excluded: its pose and picture disagree by {:.2} mm{whose}", r.name, r.mm)
             });
         }
     }
@@ -125,7 +125,8 @@ impl Evidence<'_> {
         let (axis, weak) = if self.spread[1].1 < good { self.spread[1] } else { self.spread[2] };
         j.advise(weak < good, || {
             format!(
-                "turn the flange by 20 degrees or more, both ways, about its axis ({:.2}, {:.2}, {:.2}): the poses turn by only {weak:.1} degrees rms about it",
+                "turn the flange by 20 degrees or more, both ways, about its axis ({:.2}, {:.2}, {:.2}): the poses \
+                 turn by only {weak:.1} degrees rms about it",
                 axis.x, axis.y, axis.z
             )
         });
@@ -207,8 +208,8 @@ impl SolvedCamera {
         self.before > 0.0
     }
 
-    /// One good set in some thousands is called so \[wilson31\]: a chi-square variable over its freedom, to the third root, is
-    /// normal.
+    /// One good set in some thousands is called so \[wilson31\]: a chi-square variable over its freedom, to the third
+    /// root, is normal.
     fn is_another(&self) -> bool {
         let SolvedCamera { surprise, freedom, .. } = *self;
         freedom > 0.0
@@ -219,13 +220,15 @@ impl SolvedCamera {
         let SolvedCamera { moved, before, after, surprise, freedom } = *self;
         if self.is_free() {
             j.reasons.push(format!(
-                "the camera was solved along, its calibration as what is known beforehand: its viewing rays move by {moved:.3} px, \
+                "the camera was solved along, its calibration as what is known beforehand: its viewing rays move by \
+                 {moved:.3} px, \
                  known to {before:.3} px before and {after:.3} px after; the station's camera stays as it is"
             ));
         }
         j.at_best(Verdict::Usable, self.is_another(), || {
             format!(
-                "the camera is not the one that was calibrated: the boards in these pictures want another, squared distance {surprise:.0}, \
+                "the camera is not the one that was calibrated: the boards in these pictures want another, squared \
+                 distance {surprise:.0}, \
                  {freedom:.0} expected; focus, zoom or the board's description changed"
             )
         });
@@ -266,7 +269,7 @@ pub fn page(fit: &HandEyeFit, pairs: &[Pair], quality: &Quality, carrier: &str) 
         .iter()
         .zip(pairs)
         .map(|(p, pair)| {
-            let fate = if p.used { "used" } else { "left out" };
+            let fate = if p.used { "used" } else { "excluded" };
             let in_px = |px: f64| if pixels { format!("{px:.3}") } else { "-".into() };
             vec![
                 p.name.clone(),
@@ -278,19 +281,29 @@ pub fn page(fit: &HandEyeFit, pairs: &[Pair], quality: &Quality, carrier: &str) 
             ]
         })
         .collect();
-    page.paragraph("Fit: how the pictures agree with the chain that was fitted to them. A small residual does not prove a small error. The board's own px: how its corners fit a flat board in that picture, the robot aside.");
+    page.paragraph(
+        "Fit: how the pictures agree with the chain that was fitted to them. A small residual does not \
+                    prove a small error. The board's own px: how its corners fit a flat board in that picture, the \
+                    robot aside.",
+    );
     page.table("Fit", &["picture", "the board's own px", "px", "mm", "distance² (6 expected)", ""], &fits);
     let bar = |f: &dyn Fn(&crate::calibrate::hand_eye::fit::PairResidual) -> f64| -> Vec<(String, f64)> {
         fit.pairs.iter().map(|p| (p.name.clone(), f(p))).filter(|(_, v)| v.is_finite()).collect()
     };
     page.figure("Residual of each pose in the fit, mm at the board's corners", &bars(&bar(&|p| p.mm), "mm", None));
-    page.paragraph("Verification: each pose in turn was left out of the fit and then predicted. This is the error to expect, the robot's own scatter included.");
+    page.paragraph(
+        "Verification: each pose in turn was excluded from the fit and then predicted. This is the error \
+                    to expect, the robot's own scatter included.",
+    );
     page.figure(
         "Error of each pose predicted by the others, mm at the board's corners",
         &bars(&bar(&|p| p.holdout_mm), "mm", None),
     );
     page.figure(
-        &format!("Axes that the {carrier} turned about from each pose to the next ({carrier} frame): a good set fills the disc"),
+        &format!(
+            "Axes that the {carrier} turned about from each pose to the next ({carrier} frame): a good set \
+                  fills the disc"
+        ),
         &axis_sphere(&turn_axes(fit, pairs)),
     );
     page

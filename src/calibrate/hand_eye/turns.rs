@@ -118,14 +118,18 @@ pub fn resolve(pairs: &[Pair], turns: &[Turn], seed: u64) -> Result<Vec<usize>> 
     let rival = fitting.iter().filter(|r| r.mm < MARGIN * best.mm && !r.same(best, count));
     if let Some(other) = rival.min_by(|a, b| a.mm.total_cmp(&b.mm)) {
         return Err(Fault::refused(format!(
-            "the board looks the same after a turn, and two ways to read the pictures fit the robot's poses alike: {:.3} mm and {:.3} degrees against {:.3} mm and {:.3} degrees",
+            "the board looks the same after a turn, and two readings of the pictures fit the robot's poses equally \
+             well: {:.3} mm and {:.3} degrees against {:.3} mm and {:.3} degrees",
             best.mm,
             best.rad.to_degrees(),
             other.mm,
             other.rad.to_degrees()
         ))
-        .cause("the flange turned about too few axes to tell where the board's origin is")
-        .next("tilt the flange about two axes by 20 degrees and more, or use a board with one even and one odd number of corners, or a ChArUco board"));
+        .cause("the flange turned about too few axes to determine the board's origin")
+        .next(
+            "tilt the flange about two axes by 20 degrees and more, or use a board with one even and one odd \
+               number of corners, or a ChArUco board",
+        ));
     }
     let kept =
         |shift: usize| (0..n).filter(|&i| best.agrees[i] && (best.turns[i] + shift).is_multiple_of(count)).count();
@@ -155,8 +159,12 @@ fn none_agrees(least: f64) -> Fault {
         "no three pictures agree".into()
     };
     Fault::input(format!(
-        "pictures and robot poses do not belong together: the board looks the same after a turn, and no way to read it fits the robot's poses ({off})"
+        "pictures and robot poses do not belong together: the board looks the same after a turn, and no reading of \
+         it fits the robot's poses ({off})"
     ))
-    .cause("poses and pictures mispaired or in another order, a board that was moved, or another hand-eye mount than stated")
+    .cause(
+        "poses and pictures mispaired or in another order, a board that was moved, or another hand-eye mount than \
+            stated",
+    )
     .next("check which pose belongs to which picture, and that the board stood still")
 }

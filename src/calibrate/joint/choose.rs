@@ -1,5 +1,5 @@
-//! In: what is known so far, poses that could be next. Out: what each would add, and the one after which the error of a scanned
-//! point is expected to be least.
+//! In: what is known so far, poses that could be next. Out: what each would add, and the one after which the error of
+//! a scanned point is expected to be least.
 //! Frame and unit: see `unknowns`; mm, rad, px (docs/math.md, Joint calibration (9), (10)).
 
 use super::options::{JointOptions, Noise};
@@ -39,7 +39,8 @@ fn known(m: &DMatrix<f64>) -> Vec<usize> {
     (0..m.nrows()).filter(|&i| m[(i, i)] > 0.0).collect()
 }
 
-/// The inverse over the unknowns that are known; zero for the others. Units differ by orders: the diagonal is scaled to one.
+/// The inverse over the unknowns that are known; zero for the others. Units differ by orders: the diagonal is scaled
+/// to one.
 fn inverse(m: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let at = known(m);
     let scale: Vec<f64> = at.iter().map(|&i| m[(i, i)].sqrt()).collect();
@@ -61,8 +62,8 @@ fn middle(values: impl Iterator<Item = f64>, otherwise: f64) -> f64 {
 }
 
 impl Belief {
-    /// After a solve; `places` are pixels of the working volume ([`super::volume::places`]). `None` where the covariance has no
-    /// inverse.
+    /// After a solve; `places` are pixels of the working volume ([`super::volume::places`]). `None` where the
+    /// covariance has no inverse.
     pub fn after(fit: &JointFit, places: &[Vec2], o: &JointOptions) -> Option<Belief> {
         let corners = fit.shots.iter().flat_map(|s| s.seen.sigmas_px.iter().copied());
         let peaks = fit.shots.iter().flat_map(|s| s.stripe.iter().map(|p| p.sigma_px));
@@ -88,8 +89,8 @@ impl Belief {
         inverse(&(&self.information + gain)).map_or(f64::INFINITY, |c| expected(&self.weights, &c))
     }
 
-    /// What a stop would show: the board's features, the stripe and the spot where they fall on the board. `None` where a
-    /// feature is not in the picture.
+    /// What a stop would show: the board's features, the stripe and the spot where they fall on the board. `None`
+    /// where a feature is not in the picture.
     pub fn predicted(&self, spec: &BoardSpec, board: &Rigid<Camera, Board>, place: usize) -> Option<Shot> {
         let points = spec.features();
         let camera = &self.state.camera;
@@ -194,7 +195,8 @@ pub struct Looks {
     pub lit: bool,
 }
 
-/// Boards before the camera, the whole board and, where it is asked for, some of the stripe in view; at most `count`, the same for the same seed.
+/// Boards before the camera, the whole board and, where it is asked for, some of the stripe in view; at most `count`,
+/// the same for the same seed.
 pub fn candidates(s: &State, spec: &BoardSpec, looks: &Looks, count: usize, seed: u64) -> Vec<Rigid<Camera, Board>> {
     let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
     let features = spec.features();
@@ -224,8 +226,8 @@ pub struct Choice {
     pub expected_mm: f64,
 }
 
-/// The candidate after which the error of a scanned point in the working volume is expected to be least; of equal ones the
-/// first. Candidates that cannot be seen whole are passed over.
+/// The candidate after which the error of a scanned point in the working volume is expected to be least; of equal
+/// ones the first. Candidates that cannot be seen whole are passed over.
 pub fn next(belief: &Belief, spec: &BoardSpec, candidates: &[Rigid<Camera, Board>], place: usize) -> Option<Choice> {
     let value = |board: &Rigid<Camera, Board>| {
         let shot = belief.predicted(spec, board, place)?;

@@ -1,5 +1,5 @@
-//! In: a joint solve. Out: which source limits a scanned point's error, and whether the robot's poses disagree by noise or
-//! by something that follows where the arm stands (link lengths, joint zeros).
+//! In: a joint solve. Out: which source limits a scanned point's error, and whether the robot's poses disagree by
+//! noise or by something that follows where the arm stands (link lengths, joint zeros).
 //! Frame and unit: mm, degrees (docs/math.md, Joint calibration (11)).
 
 use super::options::JointOptions;
@@ -29,8 +29,8 @@ pub struct Systematic {
 }
 
 impl Systematic {
-    /// Whether the arm errs in a way that follows its pose. What the fit has taken of noise makes it less predictable than dealt
-    /// misfits, never more.
+    /// Whether the arm errs in a way that follows its pose. What the fit has taken of noise makes it less predictable
+    /// than dealt misfits, never more.
     pub fn found(&self) -> bool {
         self.predicted > self.by_chance
     }
@@ -43,8 +43,8 @@ const DEALS: u64 = 40;
 /// Of the smooth function's coefficients against the misfits: what follows the pose is as large as what does not.
 const RIDGE: f64 = 1.0;
 
-/// Leaves each pose out in turn and predicts its misfit from the others, by a function that is linear in the flange's place
-/// and in the elements of its turn. `None` with too few poses to tell.
+/// Leaves each pose out in turn and predicts its misfit from the others, by a function that is linear in the flange's
+/// place and in the elements of its turn. `None` with too few poses to tell.
 pub fn systematic(fit: &JointFit, o: &JointOptions) -> Option<Systematic> {
     let placed: Vec<(Rigid<Base, Flange>, [f64; 6])> = fit
         .shots

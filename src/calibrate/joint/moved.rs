@@ -1,5 +1,5 @@
-//! In: stops in the order in which they were made, a solve in which the robot scatters more than arms do. Out: after which stop the board
-//! was moved, and how far.
+//! In: stops in the order in which they were made, a solve in which the robot scatters more than arms do. Out: after
+//! which stop the board was moved, and how far.
 //! Frame and unit: mm (docs/math.md, Joint calibration (13)).
 
 use super::options::JointOptions;
@@ -23,8 +23,8 @@ pub struct Moved {
     pub mm: f64,
 }
 
-/// Looks for one move of the one board that all stops show. `None` where the robot scatters as arms do, or where no move explains
-/// it.
+/// Looks for one move of the one board that all stops show. `None` where the robot scatters as arms do, or where no
+/// move explains it.
 pub fn moved(shots: &[Shot], fit: &JointFit, o: &JointOptions) -> Option<Moved> {
     if fit.noise.robot_mm < SUSPICIOUS_MM || fit.state.far_from_board.len() != 1 {
         return None;

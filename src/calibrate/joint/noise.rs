@@ -1,5 +1,5 @@
-//! In: a solve's residuals with their derivatives and its covariance. Out: what each source scatters by, how many degrees of
-//! freedom tell it, and which stops stand out.
+//! In: a solve's residuals with their derivatives and its covariance. Out: what each source scatters by, how many
+//! degrees of freedom tell it, and which stops stand out.
 //! Frame and unit: mm, rad; factors of stated sigmas (docs/math.md, Joint calibration (6), (7)).
 
 use super::options::Noise;
@@ -75,8 +75,8 @@ pub fn leavings(terms: &Terms<'_>, s: &State, covariance: &DMatrix<f64>, huber: 
 }
 
 impl Leavings {
-    /// The noise that these residuals show: each part's scatter over its redundancy. A part with less than one degree of
-    /// freedom left keeps what was assumed.
+    /// The noise that these residuals show: each part's scatter over its redundancy. A part with less than one degree
+    /// of freedom left keeps what was assumed.
     pub fn noise(&self, now: &Noise) -> Noise {
         let mut f = now.factors();
         for (k, left) in self.parts.iter().enumerate() {

@@ -53,8 +53,8 @@ pub struct JointOptions {
     pub camera_free: Vec<usize>,
     /// Of a camera that was calibrated from other pictures.
     pub camera_prior: Option<CameraPrior>,
-    /// A part of a stop is left out where its squared residual, in sigmas and over its degrees of freedom, stands this far
-    /// out; 4..=1000. Of six numbers one good stop in a million exceeds 6.5, of two 14.
+    /// A part of a stop is left out where its squared residual, in sigmas and over its degrees of freedom, stands
+    /// this far out; 4..=1000. Of six numbers one good stop in a million exceeds 6.5, of two 14.
     pub gate: f64,
     /// Length of a corner's or a peak's residual, in sigmas, from which it pulls no harder; 1.5..=20.
     pub huber: f64,

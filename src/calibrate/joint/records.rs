@@ -120,8 +120,8 @@ const LEAST_NUMBERS: i64 = 6;
 
 /// What is to be said beside the fit itself.
 pub struct Beside {
-    /// Expected error of a scanned point by separate calibrations of the same pictures, mm rms; and how far their points lie
-    /// from the joint ones, mm rms.
+    /// Expected error of a scanned point by separate calibrations of the same pictures, mm rms; and how far their
+    /// points lie from the joint ones, mm rms.
     pub separate: Option<[f64; 2]>,
     /// Whether the arm's misfits follow its pose.
     pub systematic: Option<Systematic>,
@@ -146,7 +146,8 @@ pub fn judge(fit: &JointFit, weights: &DMatrix<f64>, beside: &Beside, limits: &L
     );
     if let Some([separate, apart]) = beside.separate {
         j.reasons.push(format!(
-            "separate calibrations of the same pictures state {separate:.4} mm, added up as if they were independent; their points lie {apart:.4} mm from these (rms)"
+            "separate calibrations of the same pictures state {separate:.4} mm, added up as if they were \
+             independent; their points lie {apart:.4} mm from these (rms)"
         ));
     }
     let parts: Vec<String> = by_part(fit, weights)
@@ -167,7 +168,7 @@ pub fn judge(fit: &JointFit, weights: &DMatrix<f64>, beside: &Beside, limits: &L
         by_stops(fit, &mut j);
     }
     for l in &fit.left_out {
-        j.at_best(Verdict::Usable, true, || format!("{}: {} was left out: {}", l.name, l.part.words(), l.why));
+        j.at_best(Verdict::Usable, true, || format!("{}: {} was excluded: {}", l.name, l.part.words(), l.why));
     }
     j.reasons.extend(beside.missing.iter().map(|(name, why)| format!("{name} was not used: {why}")));
     let figures = figures(fit, mm, beside);
@@ -184,14 +185,17 @@ fn by_arm(systematic: Option<&Systematic>, j: &mut Judgement) {
     if let Some(s) = systematic.filter(|s| s.found()) {
         j.at_best(Verdict::Usable, true, || {
             format!(
-                "the arm itself limits this: {:.0} % of its misfit at a pose left out is predicted by the other poses (chance: {:.0} %): its links \
+                "the arm itself limits this: {:.0} % of its misfit at an excluded pose is predicted by the other \
+                 poses (chance: {:.0} %): its links \
                  or joint zeros are not what its controller believes",
                 100.0 * s.predicted,
                 100.0 * s.by_chance.max(0.0)
             )
         });
         j.advise(true, || {
-            "have the arm calibrated by its maker, or calibrate in the volume in which it works: points are good there only".into()
+            "have the arm calibrated by its maker, or calibrate in the volume in which it works: points are good \
+             there only"
+                .into()
         });
     }
 }
@@ -203,8 +207,8 @@ fn by_stops(fit: &JointFit, j: &mut Judgement) {
     j.at_best(Verdict::BadlyDetermined, beyond < LEAST_NUMBERS, || {
         format!("{} numbers tell the robot's scatter, {LEAST_NUMBERS} are needed", beyond.max(0))
     });
-    // An arm that scatters by far less than boards are seen to takes up little of what is left: it hardly matters for points, but whoever
-    // wants to know the arm by this number does not.
+    // An arm that scatters by far less than boards are seen to takes up little of what is left: it hardly matters for
+    // points, but whoever wants to know the arm by this number does not.
     let told = fit.freedom[3];
     j.at_best(Verdict::Usable, beyond >= LEAST_NUMBERS && told < LEAST_NUMBERS as f64, || {
         format!(

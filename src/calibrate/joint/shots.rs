@@ -42,8 +42,8 @@ pub struct Shot {
 /// makes neighbours alike.
 pub const PEAKS_A_STOP: usize = 48;
 
-/// Neighbours along the stripe averaged until [`PEAKS_A_STOP`] are left; `peaks` in order along the stripe. Within a group the
-/// stripe is straight: a lens bends it by less than 1e-3 px over ten.
+/// Neighbours along the stripe averaged until [`PEAKS_A_STOP`] are left; `peaks` in order along the stripe. Within a
+/// group the stripe is straight: a lens bends it by less than 1e-3 px over ten.
 pub fn thinned(peaks: &[StripePeak]) -> Vec<StripePeak> {
     let group = peaks.len().div_ceil(PEAKS_A_STOP).max(1);
     let mean = |g: &[StripePeak]| {

@@ -1,5 +1,5 @@
-//! In: stops, a start. Out: everything that they share by maximum likelihood, with joint covariance and the noise of every
-//! source; what was left out and why.
+//! In: stops, a start. Out: everything that they share by maximum likelihood, with joint covariance and the noise of
+//! every source; what was left out and why.
 //! Frame and unit: see `unknowns`; mm, rad, px (docs/math.md, Joint calibration).
 
 use super::noise::{Leavings, leavings};
@@ -74,7 +74,8 @@ fn held(shots: &[Shot], l: &Layout) -> Vec<usize> {
 fn undetermined(shots: &[Shot]) -> Fault {
     let with = |f: fn(&Shot) -> bool| shots.iter().filter(|s| f(s)).count();
     Fault::refused(format!(
-        "camera, hand-eye, laser plane and pointer are not determined together: {} pictures of boards, {} with a robot's pose, {} with \
+        "camera, hand-eye, laser plane and pointer are not determined together: {} pictures of boards, {} with a \
+         robot's pose, {} with \
          the stripe, {} with the pointer's spot",
         shots.len(),
         with(|s| s.robot.is_some()),

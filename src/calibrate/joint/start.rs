@@ -1,5 +1,5 @@
-//! In: stops and a camera that is roughly right. Out: a state near the answer, in closed forms that a third of wrong stops
-//! does not move.
+//! In: stops and a camera that is roughly right. Out: a state near the answer, in closed forms that a third of wrong
+//! stops does not move.
 //! Frame and unit: see `unknowns`; mm, rad, px.
 
 use super::options::JointOptions;
@@ -36,9 +36,9 @@ pub fn near_from_far(mount: Mount, pose: &Rigid<Base, Flange>) -> Rigid<Near, Fa
     Rigid::new(r, t)
 }
 
-/// A start for all that the stops speak of; `places` is how many places of boards they name. What nothing speaks of is taken
-/// from `given`, else it is the camera's own frame, axis or middle plane and stays there. Stops without a board's pose are
-/// left out.
+/// A start for all that the stops speak of; `places` is how many places of boards they name. What nothing speaks of
+/// is taken from `given`, else it is the camera's own frame, axis or middle plane and stays there. Stops without a
+/// board's pose are left out.
 pub fn start(
     shots: &mut Vec<Shot>,
     places: usize,
@@ -59,7 +59,7 @@ pub fn start(
         }
     });
     if shots.is_empty() {
-        return Err(Fault::refused("no picture shows a board whose pose can be told")
+        return Err(Fault::refused("no picture shows a board whose pose is determined")
             .cause("boards were not found, or the camera is another one")
             .next("take pictures with the whole board in view"));
     }

@@ -15,8 +15,8 @@ use crate::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Twist, Vec2, Vec
 use crate::solve::{Blocks, Problem, Residuals};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix2x3, SMatrix};
 
-/// A residual as [`Terms::visit`] hands it over: of which part and stop (`None`: the camera that was given), in sigmas; the
-/// unknowns that it depends on and its derivatives by them, row by row.
+/// A residual as [`Terms::visit`] hands it over: of which part and stop (`None`: the camera that was given), in
+/// sigmas; the unknowns that it depends on and its derivatives by them, row by row.
 pub struct Term<'a> {
     /// `None`: the camera that was given.
     pub part: Option<Part>,
@@ -46,8 +46,8 @@ pub struct Terms<'a> {
     pub prior: Option<(DVector<f64>, DMatrix<f64>)>,
 }
 
-/// Where the flange is expected, against what the robot reports, with derivatives by hand-eye, the board's place and the
-/// board's pose before the camera: three rows of the place, three of the turn.
+/// Where the flange is expected, against what the robot reports, with derivatives by hand-eye, the board's place and
+/// the board's pose before the camera: three rows of the place, three of the turn.
 pub struct Link {
     /// Expected minus reported: mm, rad.
     pub e: SMatrix<f64, 6, 1>,
@@ -129,8 +129,8 @@ pub fn link(
     }
 }
 
-/// A peak's distance from the sheet in sigmas, and its derivatives by the sheet's three numbers, the board's six, and by the
-/// camera.
+/// A peak's distance from the sheet in sigmas, and its derivatives by the sheet's three numbers, the board's six, and
+/// by the camera.
 fn peak(
     s: &State,
     board: &Rigid<Camera, Board>,

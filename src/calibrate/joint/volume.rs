@@ -1,5 +1,5 @@
-//! In: a state, depths. Out: the places in the picture where the sheet's light can be seen there; how a point that is scanned
-//! at one moves with everything that was calibrated; what error is to be expected of it.
+//! In: a state, depths. Out: the places in the picture where the sheet's light can be seen there; how a point that is
+//! scanned at one moves with everything that was calibrated; what error is to be expected of it.
 //! Frame and unit: points in the camera's carrier (flange or base), mm (docs/math.md, Joint calibration (8)).
 
 use super::terms::ray;
@@ -59,8 +59,8 @@ pub fn by_unknowns(s: &State, l: &Layout, pixel: &Vec2) -> Option<DMatrix<f64>> 
     Some(j)
 }
 
-/// Of all places together: the sum of JᵀJ over their number, so that the trace of its product with a covariance is the mean
-/// squared error of a scanned point, mm².
+/// Of all places together: the sum of JᵀJ over their number, so that the trace of its product with a covariance is
+/// the mean squared error of a scanned point, mm².
 pub fn weights(s: &State, l: &Layout, places: &[Vec2]) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(l.shared(), l.shared());
     let mut n = 0.0;

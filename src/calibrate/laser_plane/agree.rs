@@ -1,5 +1,5 @@
-//! In: stripe peaks on boards of measured pose. Out: the plane that most of them lie on, the pictures that agree with it, and
-//! a second plane in what is left over.
+//! In: stripe peaks on boards of measured pose. Out: the plane that most of them lie on, the pictures that agree with
+//! it, and a second plane in what is left over.
 //! Frame and unit: camera frame, mm; distances from a stripe in px.
 
 use super::options::{LaserPlaneOptions, refused};
@@ -19,8 +19,8 @@ pub struct SecondPlane {
     pub mm: f64,
 }
 
-/// The plane that most peaks lie on: consensus over triples from different pictures. Distances are in units of what a pixel
-/// covers at each peak's depth.
+/// The plane that most peaks lie on: consensus over triples from different pictures. Distances are in units of what a
+/// pixel covers at each peak's depth.
 pub(in crate::calibrate) fn majority(
     peaks: &[Seen],
     measured: &[Rigid<Camera, Board>],

@@ -21,13 +21,14 @@ pub(in crate::calibrate) struct HeldOut {
 /// What the pictures say of each other.
 pub(in crate::calibrate) struct Consistency {
     pub(in crate::calibrate) views: Vec<HeldOut>,
-    /// How much farther the pictures' stripes lie from the plane than their sigmas say, squared; 1 where these are right.
+    /// How much farther the pictures' stripes lie from the plane than their sigmas say, squared; 1 where these are
+    /// right.
     pub(in crate::calibrate) scatter2: f64,
     pub(in crate::calibrate) freedom: f64,
 }
 
-/// What the camera's own error adds to the sum of the pictures' squared distances over their sigmas: it moves boards and
-/// rays of each picture differently, and is stated by itself.
+/// What the camera's own error adds to the sum of the pictures' squared distances over their sigmas: it moves boards
+/// and rays of each picture differently, and is stated by itself.
 pub(in crate::calibrate) fn from_camera(
     data: &Data,
     state: &State,

@@ -12,8 +12,8 @@ pub struct LaserPlaneOptions {
     pub gate_px: f64,
     /// Peaks with a larger residual than this many sigmas are left out; 2.5..=10.
     pub gate_sigmas: f64,
-    /// A picture is left out whose stripe lies farther than this from where the others predict it: squared, in sigmas of
-    /// both, two degrees of freedom; 9..=1000.
+    /// A picture is left out whose stripe lies farther than this from where the others predict it: squared, in sigmas
+    /// of both, two degrees of freedom; 9..=1000.
     pub gate_surprise: f64,
     /// Share of the length of a picture's stripe that must agree for it to count; 0.1..=0.95.
     pub min_share: f64,

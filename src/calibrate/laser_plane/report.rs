@@ -79,13 +79,15 @@ pub fn judge(fit: &LaserPlaneFit, views: &[StripeView], camera: &Intrinsics, lim
 }
 
 impl Evidence<'_> {
-    /// Whether tilts, stripes and pictures are enough, and were seen where the work is. `view_mm`: how wide the camera sees there.
+    /// Whether tilts, stripes and pictures are enough, and were seen where the work is. `view_mm`: how wide the
+    /// camera sees there.
     fn determined(&self, view_mm: f64, j: &mut Judgement) {
         let Evidence { fit, work, spread, .. } = *self;
         let used = self.used.len();
         j.at_best(Verdict::BadlyDetermined, spread < 5.0, || {
             format!(
-                "all boards are parallel to {spread:.1} degrees: an error that they share would stay unseen; 5 are needed"
+                "all boards are parallel to {spread:.1} degrees: an error that they share would stay unseen; 5 are \
+                 needed"
             )
         });
         j.at_best(Verdict::Usable, (5.0..15.0).contains(&spread), || {
@@ -94,7 +96,8 @@ impl Evidence<'_> {
         let least = LEAST_SPREAD * view_mm;
         j.at_best(Verdict::BadlyDetermined, fit.depth_spread < least, || {
             format!(
-                "the stripes spread by {:.2} mm across their own direction, {least:.2} mm ({:.0} % of the view) are needed: they \
+                "the stripes spread by {:.2} mm across their own direction, {least:.2} mm ({:.0} % of the view) are \
+                 needed: they \
                  are nearly one line",
                 fit.depth_spread,
                 100.0 * LEAST_SPREAD
@@ -167,7 +170,7 @@ fn contradictions(fit: &LaserPlaneFit, views: &[StripeView], j: &mut Judgement) 
     for v in fit.views.iter().filter(|v| !v.used) {
         j.at_best(Verdict::Usable, true, || {
             let why = if v.contradicts { "a board that moved, a reflection, another rig" } else { "too little light" };
-            format!("{} was left out: {:.3} px from the plane of the others ({why})", v.name, v.px)
+            format!("{} was excluded: {:.3} px from the plane of the others ({why})", v.name, v.px)
         });
     }
     let against = fit.views.iter().filter(|v| v.contradicts).count();
@@ -175,7 +178,8 @@ fn contradictions(fit: &LaserPlaneFit, views: &[StripeView], j: &mut Judgement) 
     if let Some(s) = &fit.second {
         j.at_best(Verdict::BadlyDetermined, true, || {
             format!(
-                "{} pictures show light on a second plane, {:.3} mm from this one, and it is not known which is the sheet: {}",
+                "{} pictures show light on a second plane, {:.3} mm from this one, and it is not known which is the \
+                 sheet: {}",
                 s.views.len(),
                 s.mm,
                 s.views.join(", ")
@@ -185,7 +189,8 @@ fn contradictions(fit: &LaserPlaneFit, views: &[StripeView], j: &mut Judgement) 
     for v in fit.views.iter().filter(|v| v.used && v.board_misfit > MISFIT) {
         j.at_best(Verdict::Usable, true, || {
             format!(
-                "{}: its features fit the board {:.1} times worse than those of the others (another camera, or blurred)",
+                "{}: its features fit the board {:.1} times worse than those of the others (another camera, or \
+                 blurred)",
                 v.name, v.board_misfit
             )
         });
@@ -197,12 +202,14 @@ fn contradictions(fit: &LaserPlaneFit, views: &[StripeView], j: &mut Judgement) 
     let off = rms(fit.views.iter().filter(|v| v.used).map(|v| v.holdout_px));
     j.at_best(Verdict::BadlyDetermined, off > width, || {
         format!(
-            "predicted by the other pictures, a stripe lies {off:.2} px (rms) from its light, which is {width:.2} px wide (sigma)"
+            "predicted by the other pictures, a stripe lies {off:.2} px (rms) from its light, which is {width:.2} px \
+             wide (sigma)"
         )
     });
     j.at_best(Verdict::Usable, fit.scatter > SCATTER, || {
         format!(
-            "the pictures scatter {:.1} times more than their pixels explain, {SCATTER} times are allowed for good; the stated \
+            "the pictures scatter {:.1} times more than their pixels explain, {SCATTER} times are allowed for good; \
+             the stated \
              error contains it",
             fit.scatter
         )
@@ -211,7 +218,8 @@ fn contradictions(fit: &LaserPlaneFit, views: &[StripeView], j: &mut Judgement) 
     for v in fit.views.iter().filter(|v| v.used && v.beside > gate) {
         j.at_best(Verdict::BadlyDetermined, true, || {
             format!(
-                "{}: its stripe lies {:.1} sigmas from where the others predict it, {:.0} are allowed, and too few pictures \
+                "{}: its stripe lies {:.1} sigmas from where the others predict it, {:.0} are allowed, and too few \
+                 pictures \
                  are left to do without it",
                 v.name,
                 v.beside.sqrt(),
@@ -239,7 +247,7 @@ pub fn page(fit: &LaserPlaneFit, views: &[StripeView], quality: &Quality, size: 
         .views
         .iter()
         .map(|v| {
-            let fate = if v.used { "used" } else { "left out" };
+            let fate = if v.used { "used" } else { "excluded" };
             vec![
                 v.name.clone(),
                 format!("{} of {}", v.peaks_used, v.peaks),
@@ -255,7 +263,7 @@ pub fn page(fit: &LaserPlaneFit, views: &[StripeView], quality: &Quality, size: 
         "Residual of each picture in the fit, px",
         &bars(&fit.views.iter().map(|v| (v.name.clone(), v.px)).collect::<Vec<_>>(), "px", None),
     );
-    page.paragraph("Verification: each picture in turn was left out of the fit and then predicted.");
+    page.paragraph("Verification: each picture in turn was excluded from the fit and then predicted.");
     let held: Vec<(String, f64)> =
         fit.views.iter().filter(|v| v.holdout_mm.is_finite()).map(|v| (v.name.clone(), v.holdout_mm)).collect();
     page.figure("Distance of each picture's stripe from the plane of the others, mm", &bars(&held, "mm", None));

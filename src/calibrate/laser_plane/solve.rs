@@ -188,8 +188,8 @@ impl Fitting {
         Ok(Fitting { data, state, used, sigma_ratio: 1.0, neighbours: 1.0, factor: 1.0 })
     }
 
-    /// Least squares in rounds, until the sigmas stand still and no picture contradicts the others; of those that do, the
-    /// worst leaves each round.
+    /// Least squares in rounds, until the sigmas stand still and no picture contradicts the others; of those that do,
+    /// the worst leaves each round.
     fn settle(&mut self, all: &[Seen], o: &LaserPlaneOptions) -> Result<(Solution<State>, End)> {
         let mut solution = None;
         for round in 0..self.used.len() + 3 {

@@ -156,8 +156,8 @@ pub(in crate::calibrate) fn basis(plane: &Plane<Camera>) -> DMatrix<f64> {
     j
 }
 
-/// What one picture says of the plane, its board's pose eliminated (docs/math.md, Laser plane (5)): a stripe on a flat board
-/// is a straight line and tells the plane's distance at its two ends.
+/// What one picture says of the plane, its board's pose eliminated (docs/math.md, Laser plane (5)): a stripe on a
+/// flat board is a straight line and tells the plane's distance at its two ends.
 pub(in crate::calibrate) struct Says {
     /// d(distances at the stripe's ends)/d(two tilts, offset).
     pub(in crate::calibrate) by_plane: SMatrix<f64, 2, 3>,
@@ -225,7 +225,8 @@ pub(in crate::calibrate) struct ByCamera {
     pub(in crate::calibrate) gradients: Vec<Option<SMatrix<f64, 2, PARAMETERS>>>,
 }
 
-/// Through the peaks' rays and the boards' poses, by the implicit function theorem; for the parameters that are uncertain.
+/// Through the peaks' rays and the boards' poses, by the implicit function theorem; for the parameters that are
+/// uncertain.
 pub(in crate::calibrate) fn by_camera(
     data: &Data,
     state: &State,

@@ -1,4 +1,5 @@
-//! In: points in space, steps. Out: a beam as a line: through points of which some are wrong, after a step, its own parameters.
+//! In: points in space, steps. Out: a beam as a line: through points of which some are wrong, after a step, its own
+//! parameters.
 //! Frame and unit: camera frame, mm; directions have length one.
 
 use crate::geometry::{Camera, Ray, Vec3};

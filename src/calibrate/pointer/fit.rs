@@ -1,5 +1,5 @@
-//! In: spots on boards, a beam to start from. Out: the beam of these spots by maximum likelihood, the boards' poses free within
-//! their own uncertainty; how far a spot lies from it, how it follows the camera.
+//! In: spots on boards, a beam to start from. Out: the beam of these spots by maximum likelihood, the boards' poses
+//! free within their own uncertainty; how far a spot lies from it, how it follows the camera.
 //! Frame and unit: camera frame, mm; spots in px (docs/math.md, Pointer (3) to (5)).
 
 use super::beam::moved_beam;

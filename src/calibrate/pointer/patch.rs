@@ -1,5 +1,5 @@
-//! In: a picture with a spot, the places of bad pixels, and (on a board) the picture in room light. Out: the brightest place, cut
-//! out, with the shape at which a fit begins.
+//! In: a picture with a spot, the places of bad pixels, and (on a board) the picture in room light. Out: the
+//! brightest place, cut out, with the shape at which a fit begins.
 //! Frame and unit: px, grey levels (docs/math.md, Pointer (1), (2)).
 
 use crate::fault::{Fault, Result};
@@ -95,7 +95,7 @@ pub(super) fn locate(laser: &Image, ambient: Option<&Image>, hot: &[bool], max_w
     if !(top > 0.0) {
         return Err(Fault::refused("no spot stands out")
             .cause("the pointer was off, the exposure far too short, or room light hides it")
-            .next("take this picture again, or leave it out"));
+            .next("take this picture again, or exclude it"));
     }
     let peak = picture.peak(blurred.at, background);
     let width = picture.width(blurred.at, background, peak, max_width_px);

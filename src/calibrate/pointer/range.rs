@@ -56,10 +56,10 @@ pub fn range(
     let lost = || {
         Fault::refused(format!("the spot at {:.1} {:.1} px has no point on the beam", pixel.x, pixel.y))
             .cause("a reflection, or the pointer was moved since it was calibrated")
-            .next("calibrate the pointer again, or leave this picture out")
+            .next("calibrate the pointer again, or exclude this picture")
     };
     let whitener = covariance.cholesky().and_then(|c| c.l().try_inverse()).ok_or_else(|| {
-        Fault::input(format!("the spot's covariance {covariance} is none")).next("measure the spot again")
+        Fault::input(format!("the spot's covariance {covariance} is invalid")).next("measure the spot again")
     })?;
     let s = nearest(pixel, &whitener, camera, beam).ok_or_else(lost)?;
     // Derivatives of the solution by everything it depends on, by differences of the solution itself.

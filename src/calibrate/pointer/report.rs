@@ -63,7 +63,10 @@ pub fn judge(fit: &PointerFit, camera: &Intrinsics, spot_px: f64, limits: &Limit
     let overruled = used.len() < fit.spots.len();
     j.at_best(Verdict::Usable, fit.sigma_ratio > LOUD && !overruled, || loud.clone());
     j.at_best(Verdict::BadlyDetermined, fit.sigma_ratio > LOUD && overruled, || {
-        format!("{loud}, {LOUD:.0} times are allowed where others are left out: they do not agree well enough to overrule any")
+        format!(
+            "{loud}, {LOUD:.0} times are allowed if others are excluded: they do not agree well enough to \
+                 overrule any"
+        )
     });
     j.advise(low > near + 0.25 * (far - near), || format!("show the board nearer, at about {} mm", work.depth(near)));
     j.advise(high < far - 0.25 * (far - near), || {
@@ -91,20 +94,21 @@ fn by_spots(fit: &PointerFit, used: &[&SpotResidual], work: &Volume, j: &mut Jud
     });
     for s in fit.spots.iter().filter(|s| !s.used) {
         j.at_best(Verdict::Usable, true, || {
-            format!("{} was left out: its spot is {:.2} px from the beam of the others", s.name, s.px)
+            format!("{} was excluded: its spot is {:.2} px from the beam of the others", s.name, s.px)
         });
     }
     overrule(used.len(), fit.spots.len() - used.len(), j);
     if let Some([out, within]) = &fit.rivals {
         j.at_best(Verdict::BadlyDetermined, true, || {
-            format!("{out} was left out, but with it the others fit as well without {within}: it is not known which is wrong")
+            format!("{out} was excluded, but with it the others fit as well without {within}: either may be wrong")
         });
     }
     let gate = PointerOptions::default().gate;
     for s in used.iter().filter(|s| s.beside > gate) {
         j.at_best(Verdict::BadlyDetermined, true, || {
             format!(
-                "{}: its spot lies {:.1} sigmas from the beam of the others, {:.1} are allowed, and too few pictures are \
+                "{}: its spot lies {:.1} sigmas from the beam of the others, {:.1} are allowed, and too few pictures \
+                 are \
                  left to do without it",
                 s.name,
                 s.beside.sqrt(),
@@ -164,7 +168,7 @@ pub fn page(fit: &PointerFit, quality: &Quality) -> Page {
         .spots
         .iter()
         .map(|v| {
-            let fate = if v.used { "used" } else { "left out" };
+            let fate = if v.used { "used" } else { "excluded" };
             vec![v.name.clone(), format!("{:.1}", v.depth), format!("{:.4}", v.px), format!("{:.4}", v.mm), fate.into()]
         })
         .collect();
@@ -173,7 +177,7 @@ pub fn page(fit: &PointerFit, quality: &Quality) -> Page {
         "Residual of each spot, px",
         &bars(&fit.spots.iter().map(|v| (v.name.clone(), v.px)).collect::<Vec<_>>(), "px", None),
     );
-    page.paragraph("Verification: each spot in turn was left out of the fit and then predicted.");
+    page.paragraph("Verification: each spot in turn was excluded from the fit and then predicted.");
     let held: Vec<(String, f64)> =
         fit.spots.iter().filter(|v| v.holdout_px.is_finite()).map(|v| (v.name.clone(), v.holdout_px)).collect();
     page.figure("Distance of each spot from the beam of the others, px", &bars(&held, "px", None));

@@ -15,8 +15,8 @@ use nalgebra::DMatrix;
 /// Settings of [`solve`].
 #[derive(Clone, Debug)]
 pub struct PointerOptions {
-    /// A spot is wrong where its squared Mahalanobis distance (2 degrees of freedom), over what is usual among the others,
-    /// exceeds this; 9..=1000.
+    /// A spot is wrong where its squared Mahalanobis distance (2 degrees of freedom), over what is usual among the
+    /// others, exceeds this; 9..=1000.
     pub gate: f64,
     /// Spots nearer than this to the first line, in what a pixel covers there, are never left out of it; 0.5..=50.
     pub gate_px: f64,
@@ -90,7 +90,8 @@ pub struct PointerFit {
     pub sigma_ratio: f64,
     /// Nearest and farthest spot along the optical axis, mm.
     pub reach: [f64; 2],
-    /// A spot that was left out and one that was not, where the beam through the others goes as well through the one as through the other.
+    /// A spot that was left out and one that was not, where the beam through the others goes as well through the one
+    /// as through the other.
     pub rivals: Option<[String; 2]>,
     /// Whether the fit is a minimum.
     pub end: End,
@@ -115,7 +116,8 @@ struct Spots<'a> {
 /// A beam through some of the spots.
 struct Judged {
     solved: Solved,
-    /// Of every spot, squared and over what is expected, from this beam; and from the beam of the others where it was used.
+    /// Of every spot, squared and over what is expected, from this beam; and from the beam of the others where it was
+    /// used.
     distances: Vec<f64>,
     beside: Vec<f64>,
 }

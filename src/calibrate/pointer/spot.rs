@@ -184,7 +184,7 @@ fn measured(found: &Brightest, speckle: f64, o: &SpotOptions) -> Result<Spot> {
     let missing = |what: String| {
         Err(Fault::refused(what)
             .cause("the pointer was off, out of view, or drowned by room light")
-            .next("take this picture again, or leave it out"))
+            .next("take this picture again, or exclude it"))
     };
     if !(o.min_width_px..=o.max_width_px).contains(&width) {
         return missing(format!(

@@ -66,7 +66,7 @@ impl Counting {
                 Table::Chunk if step != 0 && step != seen.direction => Some(BACK),
                 Table::Chunk => None,
             };
-            self.said.extend(self.over.map(|why| format!("pictures from {} on are left out: {why}", picture.id)));
+            self.said.extend(self.over.map(|why| format!("pictures from {} on are excluded: {why}", picture.id)));
         }
         let direction = if step == 0 { seen.direction } else { step };
         *seen = Seen { numbering, count, direction };

@@ -77,8 +77,11 @@ impl PoseFeed {
             }
             PoseUri::Sim(word) => {
                 let spec = sim.ok_or_else(|| {
-                    Fault::usage(format!("{word}: poses of a simulated station, and the camera is another one"))
-                        .next("give the same word as --camera")
+                    Fault::usage(format!(
+                        "{word}: these poses belong to a simulated station, but the camera is \
+                                          another"
+                    ))
+                    .next("give the same URI as --camera")
                 })?;
                 let motion = SimMotion::new(spec)?;
                 thread(Box::new(move |s| simulate(&motion, &s)))?;
@@ -157,7 +160,7 @@ fn add(shared: &Shared, sample: Sample) {
 
 fn connect(address: &str) -> Result<TcpStream> {
     TcpStream::connect(address).map_err(|e| {
-        Fault::input(format!("{address}: nobody sends poses there: {e}"))
+        Fault::input(format!("{address}: no pose server answers there: {e}"))
             .cause("the sender is not running, or the port is another")
             .next("start it first; it has to listen, and to write a line for each pose (docs/live.md)")
     })
@@ -201,7 +204,7 @@ fn listen(stream: impl Read, shared: &Shared, paced: bool) -> String {
                 let what = if n == LONGEST {
                     "a line without an end"
                 } else {
-                    "closed in the middle of a line, which is left out"
+                    "closed in the middle of a line, which is ignored"
                 };
                 return what.into();
             }
@@ -227,7 +230,7 @@ fn listen(stream: impl Read, shared: &Shared, paced: bool) -> String {
                 if clock.jumps() > before {
                     let mut state = lock(&shared.0);
                     state.track.cut();
-                    state.said.push("the clock of the poses jumped: nothing is told across it".into());
+                    state.said.push("the clock of the poses jumped: no pose is interpolated across the jump".into());
                 }
                 let moment = clock.host(told.t_ns).expect("a reading was taken in");
                 (moment.ns as u64, moment.sigma_ns.max(WAY))
@@ -263,7 +266,8 @@ fn sample(pose: &TimedPose, clock: &mut ClockMap) -> Sample {
     Sample { ns, sigma_ns, stand: Stand::Robot(pose.base_from_flange) }
 }
 
-/// Asks a robot until it is told to stop; `again` connects anew where a connection broke. A list of poses that is at its end stays so.
+/// Asks a robot until it is told to stop; `again` connects anew where a connection broke. A list of poses that is at
+/// its end stays so.
 fn ask(poses: Box<dyn PoseSource>, again: impl Fn() -> Result<Box<dyn PoseSource>>, shared: &Shared) {
     let (mut clock, mut poses, mut answers) = (ClockMap::default(), Some(poses), true);
     while !shared.1.load(Ordering::Relaxed) {
@@ -278,7 +282,7 @@ fn ask(poses: Box<dyn PoseSource>, again: impl Fn() -> Result<Box<dyn PoseSource
                 let mut state = lock(&shared.0);
                 if clock.jumps() > jumps {
                     state.track.cut();
-                    state.said.push("the controller's clock jumped: nothing is told across it".into());
+                    state.said.push("the controller's clock jumped: no pose is interpolated across the jump".into());
                 }
                 if !std::mem::replace(&mut answers, true) {
                     state.said.push("the robot tells its pose again".into());

@@ -1,5 +1,5 @@
-//! In: lines of text that say where something stood: a head that names convention and clock, then a time and a pose, or a count, each. Out: what each
-//! line says; refused where units or order are not what was named.
+//! In: lines of text that say where something stood: a head that names convention and clock, then a time and a pose,
+//! or a count, each. Out: what each line says; refused where units or order are not what was named.
 //! Frame and unit: base_from_flange, mm, or counts; ns of the clock that the head names.
 
 use crate::fault::{Fault, Result};
@@ -55,7 +55,8 @@ pub struct Lines {
 }
 
 fn head() -> &'static str {
-    "begin the stream with '# convention: denso' (or another name) or '# counts: count', and '# clock: unix' or '# clock: own'"
+    "begin the stream with '# convention: denso' (or another name) or '# counts: count', and '# clock: unix' or '# \
+     clock: own'"
 }
 
 impl Lines {
@@ -69,8 +70,8 @@ impl Lines {
         self.unit
     }
 
-    /// Reads a line that was here at `here_ns`; `None` for the head and for empty lines. `paced`: lines come as they are written, not
-    /// out of a file.
+    /// Reads a line that was here at `here_ns`; `None` for the head and for empty lines. `paced`: lines come as they
+    /// are written, not out of a file.
     ///
     /// # Errors
     /// Numbers before the head, another number of them, a unit that is not the one that was named.
@@ -83,18 +84,18 @@ impl Lines {
             return Ok(None);
         }
         let (Some(kind), Some(_)) = (self.kind, self.clock) else {
-            return Err(Fault::input("poses come before anybody said in which convention and by which clock")
+            return Err(Fault::input("poses arrived before the head that states their convention and clock")
                 .cause("six numbers can be read in nine ways, and times by two clocks; this program does not guess")
                 .next(head()));
         };
         let bad = |why: &str| {
             Fault::input(format!(
-                "'{}' is no line of times and {}: {why}",
+                "'{}' is not a line of times and {}: {why}",
                 shown(line),
                 if kind == Kind::Count { "counts" } else { "poses" }
             ))
             .cause("another layout, or bytes that were lost")
-            .next("write t_ns and the numbers, parted by blanks or commas")
+            .next("write t_ns and the numbers, separated by blanks or commas")
         };
         let mut cells = line.split([' ', ',', '\t', ';']).filter(|c| !c.is_empty());
         let t_ns = cells
@@ -167,11 +168,9 @@ impl Lines {
             let unit = [(1e3, "milliseconds"), (1e6, "microseconds"), (1.0, "seconds")];
             let near =
                 unit.iter().find(|(n, _)| (0.5..=2.0).contains(&(per / n))).map_or("another unit", |(_, name)| name);
-            return Err(Fault::refused(format!(
-                "t_ns goes on by {per:.0} in a second, 1000000000 nanoseconds are one"
-            ))
-            .cause(format!("the times are in {near}, or the sender runs at another speed than time"))
-            .next("send times in nanoseconds, as they are true"));
+            return Err(Fault::refused(format!("t_ns increases by {per:.0} in a second, expected are 1000000000"))
+                .cause(format!("the times are in {near}, or the sender runs at another speed than time"))
+                .next("send true times in nanoseconds"));
         }
         if self.clock == Some(LineClock::Unix) && paced && here_ns.abs_diff(t_ns) > 3_600_000_000_000 && !self.meant {
             return Err(Fault::refused(format!(
@@ -196,7 +195,10 @@ impl Lines {
             return Ok(());
         }
         let asked = |what: String, cause: &str| {
-            Err(Fault::refused(what).cause(cause.to_owned()).next("name the convention that the robot really writes, or, where it is right, write '# units: as named' first"))
+            Err(Fault::refused(what).cause(cause.to_owned()).next(
+                "name the convention that the robot really writes, \
+                or confirm the unit with '# units: as named' in the head",
+            ))
         };
         let name = convention.name();
         if self.reach < METRES {
@@ -247,8 +249,8 @@ mod tests {
         assert_eq!(all(&stream(denso, 50_000_000, pose)), Ok(12));
         assert_eq!(all(&stream("# counts: count\n# clock: own", 50_000_000, "17")), Ok(12));
         for (head, per_line, pose, says) in [
-            ("# clock: own", 50_000_000, pose, "in which convention"),
-            ("# convention: denso", 50_000_000, pose, "by which clock"),
+            ("# clock: own", 50_000_000, pose, "their convention and clock"),
+            ("# convention: denso", 50_000_000, pose, "their convention and clock"),
             ("# convention: yamaha\n# clock: own", 1, pose, "unknown pose convention"),
             (denso, 50, pose, "milliseconds"),
             (denso, 50_000, pose, "microseconds"),

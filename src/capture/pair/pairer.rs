@@ -95,7 +95,8 @@ impl Pairer {
         }
     }
 
-    /// The next outcome, in the order of the pictures; `None` where it is too early to say. With `all` nothing is waited for.
+    /// The next outcome, in the order of the pictures; `None` where it is too early to say. With `all` nothing is
+    /// waited for.
     pub fn next(&mut self, clock: &ClockMap, all: bool) -> Option<Outcome> {
         let (picture, numbering) = self.waiting.front()?;
         let late = all || now_ns().saturating_sub(picture.host_ns) > PATIENCE;

@@ -1,4 +1,5 @@
-//! In: where things stood, numbered; or how far an axis goes from pulse to pulse. Out: where they stood at a picture's number. Gaps stay gaps.
+//! In: where things stood, numbered; or how far an axis goes from pulse to pulse. Out: where they stood at a
+//! picture's number. Gaps stay gaps.
 //! Frame and unit: base_from_flange, mm, or counts.
 
 use crate::recording::Stand;

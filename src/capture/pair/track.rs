@@ -1,5 +1,5 @@
-//! In: where something stood, sample after sample with its time. Out: where it stood at a time between two of them, how fast it moved; or why
-//! nobody knows.
+//! In: where something stood, sample after sample with its time. Out: where it stood at a time between two of them,
+//! how fast it moved; or why nobody knows.
 //! Frame and unit: base_from_flange in mm, or counts; the host's time in ns.
 
 use crate::geometry::{Base, Flange, Rigid, exp, log};
@@ -22,7 +22,8 @@ pub struct Sample {
 pub struct Between {
     /// Where.
     pub stand: Stand,
-    /// How it moved, a second: of a flange the motion seen from the base (mm, then rad), of an axis its counts in the first place.
+    /// How it moved, a second: of a flange the motion seen from the base (mm, then rad), of an axis its counts in the
+    /// first place.
     pub rate: [f64; 6],
     /// 1 sigma of the samples' times, ns.
     pub sigma_ns: f64,

@@ -1,5 +1,5 @@
-//! In: shots as a recorder has written them. Out: the same in order for who works on them meanwhile: the next few from memory, what has to wait
-//! longer from the recorder's disk.
+//! In: shots as a recorder has written them. Out: the same in order for who works on them meanwhile: the next few
+//! from memory, what has to wait longer from the recorder's disk.
 //! Frame and unit: as [`crate::recording`].
 
 use crate::raster::Image;

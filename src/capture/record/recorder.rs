@@ -1,5 +1,5 @@
-//! In: pictures in order, what is known of each. Out: a recording folder: meta.json at once, then each picture before its line of frames.jsonl, so
-//! that whatever stops the program leaves a recording of all that was written.
+//! In: pictures in order, what is known of each. Out: a recording folder: meta.json at once, then each picture before
+//! its line of frames.jsonl, so that whatever stops the program leaves a recording of all that was written.
 //! Frame and unit: docs/file-formats.md; raw frames as `RawFormat` has them.
 
 use super::super::format::{Format, raw_bytes};

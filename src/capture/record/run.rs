@@ -1,4 +1,5 @@
-//! In: a stream, a recorder. Out: a recording, written by a thread of its own while others read what is there; its account.
+//! In: a stream, a recorder. Out: a recording, written by a thread of its own while others read what is there; its
+//! account.
 //! Frame and unit: docs/file-formats.md.
 
 use super::super::account::Account;
@@ -26,10 +27,12 @@ pub struct Recording {
 
 const GLANCE: Duration = Duration::from_millis(200);
 
-/// Records until the stream ends. `say` is told what a person should hear, and the account now and then. With `on` each shot is handed on.
+/// Records until the stream ends. `say` is told what a person should hear, and the account now and then. With `on`
+/// each shot is handed on.
 ///
 /// # Errors
-/// The disk is full: what was recorded stays, and the pictures from then on are dropped. What ended the stream, where nobody wished it.
+/// The disk is full: what was recorded stays, and the pictures from then on are dropped. What ended the stream, where
+/// nobody wished it.
 pub fn record(
     stream: &mut Stream,
     mut recorder: Recorder,

@@ -26,7 +26,8 @@ impl Space {
         Space { free: free(folder), looked: Instant::now(), then: 0, rate: 0.0, said: f64::INFINITY }
     }
 
-    /// What a person should hear before the disk is full: once, and again when half of the time is over. `bytes`: written so far.
+    /// What a person should hear before the disk is full: once, and again when half of the time is over. `bytes`:
+    /// written so far.
     pub fn warn(&mut self, folder: &Path, bytes: u64) -> Option<String> {
         let since = self.looked.elapsed();
         if since < LOOK {

@@ -40,8 +40,8 @@ struct Link {
 }
 
 impl CellCamera {
-    /// Connects to `HOST:PORT` and asks for `rate_hz` pictures a second; 0: as the cell likes, negative: only those that
-    /// are asked for one by one ([`CellCamera::snap`]).
+    /// Connects to `HOST:PORT` and asks for `rate_hz` pictures a second; 0: as the cell likes, negative: only those
+    /// that are asked for one by one ([`CellCamera::snap`]).
     ///
     /// # Errors
     /// Nobody answers, or something else than a cell.
@@ -64,7 +64,7 @@ impl CellCamera {
         let [width, height, bits @ 8..=16] = numbers[..] else {
             return Err(Fault::input(format!("{}: says its format is '{said}'", self.address))
                 .cause("another version of the cell, or another program")
-                .next("start the cell that came with this program"));
+                .next("start the cell of this version of the program"));
         };
         self.format = Format { width, height, bits: bits as u8 };
         if self.rate_hz >= 0.0 {
@@ -85,7 +85,7 @@ impl CellCamera {
     fn ask(&mut self, line: &str) -> Result<String> {
         let lost = |what: String| {
             Fault::input(format!("{}: {what}", self.address))
-                .cause("the cell was stopped, or another program answers there")
+                .cause("the cell was stopped, or another program uses that port")
                 .next("start the cell and compare the address with the one that it prints")
         };
         let sent = self.link.stream.write_all(format!("{line}\n").as_bytes());

@@ -25,7 +25,8 @@ pub struct Ffmpeg {
 const LIVE: [&str; 9] = ["v4l2", "dshow", "avfoundation", "rtsp:", "rtp:", "udp:", "srt:", "tcp:", "-re"];
 
 impl Ffmpeg {
-    /// Starts ffmpeg with `arguments` before the output that we ask for, `bits` deep. What it opens is asked for its size first.
+    /// Starts ffmpeg with `arguments` before the output that we ask for, `bits` deep. What it opens is asked for its
+    /// size first.
     ///
     /// # Errors
     /// ffmpeg is missing, or cannot open it.
@@ -77,8 +78,8 @@ fn size(arguments: &[String], bits: u8) -> Result<Format> {
     }
     let errors = String::from_utf8_lossy(&output.stderr).trim().replace('\n', "; ");
     Err(Fault::input(format!("ffmpeg gives no picture: {errors}"))
-        .cause("the device or file is not there or in use, or the words are not ffmpeg's")
-        .next(format!("try it by itself: ffmpeg {} -f null -", arguments.join(" "))))
+        .cause("the device or file is missing or in use, or ffmpeg does not know these options")
+        .next(format!("try it alone: ffmpeg {} -f null -", arguments.join(" "))))
 }
 
 /// Leaves levels as the camera sends them: without it ffmpeg takes luma without a tag for 16 to 235 and stretches that
@@ -138,7 +139,7 @@ impl PictureSource for Ffmpeg {
                 Event::Lost(
                     Fault::input(format!("ffmpeg ended ({how}): {words}"))
                         .cause("the device was unplugged, the network failed, or the file is damaged")
-                        .next("plug it in again and run the command again; what was recorded is kept"),
+                        .next("plug it in again and run the command again; the finished part is stored"),
                 )
             }
         }

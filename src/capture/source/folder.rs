@@ -1,4 +1,5 @@
-//! In: a folder that another program fills with pictures. Out: each picture once it is complete: its size has settled and it decodes.
+//! In: a folder that another program fills with pictures. Out: each picture once it is complete: its size has settled
+//! and it decodes.
 //! Frame and unit: the host's time at which it was seen complete, ns.
 
 use crate::capture::clock::now_ns;
@@ -36,7 +37,8 @@ pub struct FolderCamera {
 }
 
 impl FolderCamera {
-    /// Waits up to `patience` for the first new picture, which tells the format. `bits` is the sensor's depth of 16-bit files.
+    /// Waits up to `patience` for the first new picture, which tells the format. `bits` is the sensor's depth of
+    /// 16-bit files.
     ///
     /// # Errors
     /// No folder, no picture within the time, one that is no grey level picture of that depth.
@@ -44,7 +46,7 @@ impl FolderCamera {
         let (send, changes) = channel();
         let cannot = |e: &dyn std::fmt::Display| {
             Fault::input(format!("{}: cannot be watched: {e}", folder.display()))
-                .cause("the folder is not there, or the limit of watched folders is reached")
+                .cause("the folder is missing, or the limit of watched folders is reached")
                 .next("make the folder before the other program fills it")
         };
         let mut watcher = notify::recommended_watcher(send).map_err(|e| cannot(&e))?;

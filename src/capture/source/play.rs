@@ -1,5 +1,5 @@
-//! In: a recording, a rate. Out: its laser pictures as a camera sends them, each with where things stood; a camera whose buffer is
-//! full loses pictures, this one too.
+//! In: a recording, a rate. Out: its laser pictures as a camera sends them, each with where things stood; a camera
+//! whose buffer is full loses pictures, this one too.
 //! Frame and unit: the recording's; the device's clock counts ns from its start.
 
 use crate::camera::Readout;

@@ -1,5 +1,5 @@
-//! In: a simulated station by its seed, what moves how fast. Out: the picture of where things stand right now, rendered; where they stood at
-//! any time, for the pairing by clock.
+//! In: a simulated station by its seed, what moves how fast. Out: the picture of where things stand right now,
+//! rendered; where they stood at any time, for the pairing by clock.
 //! Frame and unit: base_from_flange, mm, or counts; the device's clock is the host's plus the stated delay, ns.
 
 use crate::camera::Readout;
@@ -108,7 +108,7 @@ impl SimMotion {
         ];
         if let Some((name, value, range)) = ranges.iter().find(|(_, value, range)| !range.contains(value)) {
             let (least, most) = (range.start(), range.end());
-            return Err(Fault::usage(format!("sim:{}: {name} is {value:e}, wanted {least} to {most}", spec.seed))
+            return Err(Fault::usage(format!("sim:{}: {name} is {value:e}; allowed: {least} to {most}", spec.seed))
                 .next("correct the camera's address (docs/live.md)"));
         }
         let station = Station::random(spec.seed).with_size(w, h);
@@ -119,8 +119,10 @@ impl SimMotion {
         let mut scene = Scene::new(scene)?;
         let way = match spec.axis {
             None if spec.board => {
-                return Err(Fault::usage("a simulated board rides on an axis, and none is simulated")
-                    .next("name one, axis=linear or axis=turntable; a robot over a board is a cell's: sheetlight cell simulate"));
+                return Err(Fault::usage("a simulated board rides on an axis, but no axis is simulated").next(
+                    "name one, axis=linear or axis=turntable; a robot over a board is a cell's: sheetlight \
+                           cell simulate",
+                ));
             }
             None => {
                 let ends = scan(&station, &scene, 2);

@@ -1,5 +1,6 @@
 //! In: pose data in all the forms that a controller takes. Out: a pose or joints; and poses in its own form.
-//! Frame and unit: mm and degrees as Denso writes them: P = X Y Z RX RY RZ Fig, T = X Y Z, orient, approach, Fig, J = joints.
+//! Frame and unit: mm and degrees as Denso writes them: P = X Y Z RX RY RZ Fig, T = X Y Z, orient, approach, Fig, J =
+//! joints.
 
 use super::super::kinematics::{Joints, figure};
 use super::{BAD_POSE, Outcome};

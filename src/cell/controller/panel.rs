@@ -32,7 +32,8 @@ pub struct Panel {
     pub external: [f64; 3],
     /// Internal speed.
     pub internal: f64,
-    /// The figure that the arm says it has, where it is another than its joints'; and the one that the next motion gives it.
+    /// The figure that the arm says it has, where it is another than its joints'; and the one that the next motion
+    /// gives it.
     pub figure: Option<i32>,
     pub next_figure: Option<i32>,
     pub variables: BTreeMap<String, Variant>,

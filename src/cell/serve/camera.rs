@@ -118,7 +118,7 @@ impl Viewer {
                     *rate = Some(fps);
                     "ok".into()
                 }
-                _ => format!("error '{fps}' is no rate, 0.01 to 2000 pictures a second are"),
+                _ => format!("error '{fps}' is not a rate; allowed: 0.01 to 2000 pictures per second"),
             },
             ("stop", _) => {
                 *rate = None;
@@ -157,8 +157,8 @@ impl Viewer {
         }
     }
 
-    /// Takes pictures at the rate that was asked for, at even moments of the cell's time, which goes on meanwhile: those whose moment
-    /// has passed when the one before is made are taken and not sent, and their numbers are missing.
+    /// Takes pictures at the rate that was asked for, at even moments of the cell's time, which goes on meanwhile:
+    /// those whose moment has passed when the one before is made are taken and not sent, and their numbers are missing.
     fn run(&self, over: &AtomicBool, faults: &Faults) {
         let mut next = None::<f64>;
         while !over.load(Ordering::Relaxed) && !Faults::on(&faults.camera_gone) {

@@ -1,5 +1,5 @@
-//! In: TCP clients of the controller. Out: their answers, each client on a thread of its own; a frame that cannot be read
-//! closes its connection without an answer, as Denso's service does.
+//! In: TCP clients of the controller. Out: their answers, each client on a thread of its own; a frame that cannot be
+//! read closes its connection without an answer, as Denso's service does.
 //! Frame and unit: bytes; ms.
 
 use super::Faults;

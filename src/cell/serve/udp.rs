@@ -1,5 +1,5 @@
-//! In: UDP clients of the controller. Out: their answers, one call after the other for all clients, as Denso's service does it;
-//! a repeated request is answered from memory and done once.
+//! In: UDP clients of the controller. Out: their answers, one call after the other for all clients, as Denso's
+//! service does it; a repeated request is answered from memory and done once.
 //! Frame and unit: bytes; ms.
 
 use super::Faults;

@@ -1,4 +1,5 @@
-//! In: a robot and a camera on their wires, a board below them. Out: the station's whole rig, by moves of the program's choice.
+//! In: a robot and a camera on their wires, a board below them. Out: the station's whole rig, by moves of the
+//! program's choice.
 //! Frame and unit: mm, mm/s.
 
 use super::joint::finish;
@@ -14,38 +15,38 @@ use crate::station::volume::asked;
 use crate::station::{ArmCell, AutoRun, JointRun, Settings, calibrate_auto};
 use std::path::PathBuf;
 
-/// Calibrate camera, hand-eye, laser plane and pointer by moves that the program chooses
+/// Calibrate everything while the program moves the robot
 ///
-/// One board lies below the robot, or is on its flange before a camera that stands still (--mount eye-to-hand); jog
-/// until the whole of it is in the picture. The program makes small moves first, then goes to the
-/// pose that lowers the expected error of a scanned point the most, among those that station.toml's [motion] allows, that can be
-/// reached, and that keep board and stripe in view; it ends at --target-mm, or where more stops do not help, and checks itself on five
-/// poses that no solve saw. Every move is shown and asked for. The pictures are kept in --out: `calibrate joint` on them comes to the
-/// same. Ctrl-C halts the arm.
+/// One board lies below the robot, or is on its flange in front of a fixed camera (--mount eye-to-hand). Jog the arm
+/// until the whole board is in the picture. The program makes small moves first. Then it goes to the pose that lowers
+/// the expected error of a scanned point most, within the limits of [motion] in station.toml. It ends at --target-mm
+/// or when more stops do not help, and checks itself on five further poses. Every move is shown and confirmed.
+/// `calibrate joint` on the stored pictures gives the same result. Ctrl-C halts the arm.
 ///
-/// Sheetlight is no safety device: somebody stands at the emergency stop.
+/// Sheetlight is not a safety device: somebody stands at the emergency stop.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight calibrate auto --station cell3 --robot bcap://192.168.0.1:5007 \\
-      --camera gige://first --board board.json --out pictures --target-mm 0.025 --allow-motion")]
+      --camera gige://first --board board.json --out pictures --target-mm 0.025 --allow-motion
+Guide: docs/calibration.md")]
 pub struct Args {
     #[command(flatten)]
     moving: Moving,
     /// The board's description (docs/boards.md)
     #[arg(long)]
     board: PathBuf,
-    /// Folder that the pictures go into; new or empty
+    /// Folder for the pictures; new or empty
     #[arg(long)]
     out: PathBuf,
-    /// Expected error of a scanned point at which it is enough, mm rms
-    #[arg(long)]
+    /// Target for the expected error of a scanned point, mm rms
+    #[arg(long, value_name = "MM")]
     target_mm: f64,
     #[command(flatten)]
     mount: mount::Where,
-    /// Stops at most
+    /// Largest number of stops
     #[arg(long, default_value_t = 40)]
     most: usize,
-    /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
+    /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
     #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
     #[command(flatten)]
@@ -77,7 +78,8 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         if args.out.join("line/meta.json").is_file() {
             let (out, station) = (args.out.display(), moving.station.display());
             console.warn(format!(
-                "the pictures so far are kept: sheetlight calibrate joint {out}/* --station {station} makes of them what it can"
+                "the pictures so far are kept: sheetlight calibrate joint {out}/* --station {station} makes of them \
+                 what it can"
             ));
         }
     })?;

@@ -12,12 +12,12 @@ use crate::station::volume::asked;
 use crate::station::{AxisRun, Settings, calibrate_axis};
 use std::path::PathBuf;
 
-/// Find how a linear axis or turntable moves parts before a camera that stands still
+/// Calibrate a linear axis or turntable
 ///
-/// A board of any kind lies on the axis and rides along; each frame has a picture of it in room light and the axis' count
-/// there. meta.json states the motion: its kind (linear, turntable), what it carries, and the unit of the counts
-/// (docs/file-formats.md). Where the axis carries the sensor and the board stands still it is the same. Stops lie unevenly, so
-/// that counts of another picture or order are seen; between neighbouring stops a turntable turns by less than half a turn.
+/// A board of any kind rides on the axis. Each frame has a picture of it in room light and the axis' count. meta.json
+/// states the motion: its kind (linear, turntable), what it carries, and the unit of the counts
+/// (docs/file-formats.md). The axis may also carry the sensor over a fixed board. Use uneven stops, so that counts of
+/// another picture or order are detected. Between neighbouring stops a turntable turns by less than half a turn.
 /// Scans of such recordings need no hand-eye.
 #[derive(clap::Args)]
 #[command(after_help = "From calibration to cloud:
@@ -26,14 +26,15 @@ use std::path::PathBuf;
   sheetlight calibrate axis        recordings/axis       --station belt1
   sheetlight scan recordings/parcel4 --station belt1 --out scans/parcel4
 Try it without a belt:
-  sheetlight simulate --motion linear --set intrinsics,laserplane,axis,scan --out belt")]
+  sheetlight simulate --motion linear --set intrinsics,laserplane,axis,scan --out belt
+Guide: docs/scanning.md")]
 pub struct Args {
-    /// Recording folder: a board that rides on the axis, a picture and a count per frame
+    /// Recording of a board on the axis, with a picture and a count per frame
     recording: PathBuf,
     /// Station folder with the camera's calibration
     #[arg(long)]
     station: PathBuf,
-    /// Part of a colour picture to use: red, green, blue or luma
+    /// Channel of a colour picture: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
     #[command(flatten)]

@@ -16,37 +16,36 @@ use std::path::PathBuf;
 
 /// Calibrate the camera from pictures of a board
 ///
-/// Needs 10 to 20 pictures with the board tilted by 20 to 40 degrees in different directions and
-/// reaching into the picture's corners. The board's description is in the recording's meta.json.
-/// Several recordings of the same camera, of other boards too, are solved together.
+/// Take 10 to 20 pictures with the board tilted by 20 to 40 degrees in different directions, reaching into the
+/// picture's corners. The board's description is in the recording's meta.json. Several recordings of the same camera,
+/// also of other boards, are solved together.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight calibrate camera recordings/boards --station cell3
-  sheetlight calibrate camera recordings/boards recordings/handeye --station cell3")]
+  sheetlight calibrate camera recordings/boards recordings/handeye --station cell3
+Guide: docs/calibration.md")]
 pub struct Args {
     /// Recording folders with meta.json
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
-    /// Station folder that gets the calibration
+    /// Station folder for the result
     #[arg(long)]
     station: PathBuf,
-    /// Lens: evidence (what the pictures determine, tilt, prism or rational terms too), none, one (k1), four (k1 k2 p1 p2), five (k3 too),
-    /// rational (five and k4 k5 k6), prism (five and s1..s4), scheimpflug (k1 k2 k3 and the sensor's tilt),
-    /// all (OpenCV's 14 terms)
+    /// Lens terms: evidence (what the pictures determine), none, one (k1), four (k1 k2 p1 p2), five (k3 too),
+    /// rational (and k4 k5 k6), prism (five and s1..s4), scheimpflug (k1 k2 k3 and tilt), all (OpenCV's 14)
     #[arg(long, default_value = "evidence", value_parser = crate::cli::terminal::arguments::parse::<Lens>)]
     lens: Lens,
-    /// Estimate the skew too (sensors with square rows have none)
+    /// Estimate the skew too; sensors with square rows have none
     #[arg(long)]
     skew: bool,
-    /// The board: evidence (as drawn, unless 8 or more pictures of one board tell its bending and its print's errors: these are estimated
-    /// too then, and said), drawn, shaped (estimated whatever comes)
+    /// Shape of the board: evidence (estimated if 8 or more pictures determine it), drawn (as drawn), shaped (always
+    /// estimated)
     #[arg(long, default_value = "evidence", value_parser = crate::cli::terminal::arguments::parse::<Boards>)]
     board: Boards,
-    /// Distance at which the expected error is stated, mm [default: the middle of station.toml's working volume, else where
-    /// the boards stood]
-    #[arg(long)]
+    /// Distance at which the expected error is stated, mm [default: middle of the working volume, else of the boards]
+    #[arg(long, value_name = "MM")]
     working_mm: Option<f64>,
-    /// Part of a colour picture to use: red, green, blue or luma
+    /// Channel of a colour picture: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
     #[command(flatten)]

@@ -16,47 +16,46 @@ use crate::station::{
 };
 use std::path::{Path, PathBuf};
 
-/// Find the camera's pose on the flange from pictures of a fixed board and the robot's poses
+/// Calibrate the camera's pose on the flange
 ///
-/// Pictures and poses are adjusted together: pixels weigh by their noise, poses by the robot's, which
-/// is estimated. Pairs that do not belong together are found and named. The result says how far a
-/// point at the working distance is to be trusted, and each pose is predicted by the others.
-/// With --board-poses no pictures are read: the file holds the board's poses as another program measured them.
+/// The recording shows one fixed board from many robot poses. Pictures and poses are adjusted together: pixels are
+/// weighted by their noise, poses by the robot's estimated scatter. Pairs that do not belong together are found and
+/// named. The result states the error of a point at the working distance, and each pose is predicted by the others.
+/// With --board-poses no pictures are read: the file holds board poses that another program measured.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight calibrate hand-eye recordings/handeye --poses poses_noisy --station cell3
-  sheetlight calibrate hand-eye --board-poses boards.csv --poses robot.csv --station cell3")]
+  sheetlight calibrate hand-eye --board-poses boards.csv --poses robot.csv --station cell3
+Guide: docs/calibration.md")]
 pub struct Args {
-    /// Recording folder: one board that stands still, a picture and a pose per frame
+    /// Recording of one fixed board, with a picture and a pose per frame
     #[arg(required_unless_present = "board_poses", conflicts_with = "board_poses")]
     recording: Option<PathBuf>,
-    /// Station folder; with pictures it holds the camera's calibration
+    /// Station folder with the camera's calibration
     #[arg(long)]
     station: PathBuf,
-    /// Pose file of the recording, without extension [default: the one meta.json names]; beside --board-poses a path
+    /// Pose file of the recording, without extension [default: the one in meta.json]; with --board-poses a path
     #[arg(long)]
     poses: Option<String>,
-    /// Board poses in the camera frame (camera_T_board, docs/file-formats.md) in place of pictures
-    #[arg(long, requires = "poses")]
+    /// Board poses (camera_T_board, docs/file-formats.md) instead of pictures
+    #[arg(long, value_name = "FILE", requires = "poses")]
     board_poses: Option<PathBuf>,
-    /// Sigma of the board poses' position per axis, mm [default: their places' scatter counts as the
-    /// robot's, their turns' is estimated]
-    #[arg(long, requires = "board_poses", requires = "board_sigma_deg")]
+    /// Sigma of the board poses' position per axis, mm [default: included in the robot's]
+    #[arg(long, value_name = "MM", requires = "board_poses", requires = "board_sigma_deg")]
     board_sigma_mm: Option<f64>,
     /// Sigma of the board poses' orientation per axis, degrees
-    #[arg(long, requires = "board_poses", requires = "board_sigma_mm")]
+    #[arg(long, value_name = "DEG", requires = "board_poses", requires = "board_sigma_mm")]
     board_sigma_deg: Option<f64>,
     #[command(flatten)]
     mount: mount::Where,
     /// Sigma of the robot's position per axis, mm [default: estimated]
-    #[arg(long)]
+    #[arg(long, value_name = "MM")]
     robot_sigma_mm: Option<f64>,
     /// Sigma of the robot's orientation per axis, degrees [default: estimated]
-    #[arg(long)]
+    #[arg(long, value_name = "DEG")]
     robot_sigma_deg: Option<f64>,
-    /// Distance at which the expected error is stated, mm [default: the middle of station.toml's working volume, else of
-    /// where the laser plane's boards stood, else of where these stood]
-    #[arg(long)]
+    /// Distance at which the expected error is stated, mm [default: middle of the working volume, else of the boards]
+    #[arg(long, value_name = "MM")]
     working_mm: Option<f64>,
     #[command(flatten)]
     keep: Keep,
@@ -83,7 +82,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             if let Some([mm, rad]) = board_sigma.filter(|s| !s.iter().all(|s| *s > 0.0 && s.is_finite())) {
                 let deg = rad.to_degrees();
                 return Err(Fault::usage(format!("board sigmas of {mm} mm and {deg} degrees, above 0 is allowed"))
-                    .next("state what the other program's poses scatter by, or leave both out"));
+                    .next("state the scatter of the other program's poses, or omit both options"));
             }
             calibrate_hand_eye_from_poses(&PosePairs { robot, boards: boards.clone(), board_sigma }, &rig, &run)?
         }

@@ -13,39 +13,38 @@ use crate::station::volume::asked;
 use crate::station::{JointResult, JointRun, Settings, calibrate_joint, store_joint};
 use std::path::{Path, PathBuf};
 
-/// Calibrate camera, hand-eye, laser plane and pointer together from any recordings of boards
+/// Calibrate everything in one solve from any recordings of boards
 ///
-/// Recordings come in any order, as many as there are: boards in room light, with robot poses where the board stood still
-/// before the robot (or was carried by it), with the stripe or the pointer's spot where meta.json says so ('beam'). What they
-/// share is solved for at once; how much corners, stripe, spots and the robot scatter is learnt from what is left over, so that
-/// each weighs by what it is good for. The verdict is the expected error of a scanned point in the working volume, beside what
-/// separate calibrations of the same pictures would give, and says what makes it. A camera that was calibrated from other
-/// pictures before is held against these.
+/// Recordings come in any order and number: boards in room light, with robot poses of a board that is fixed or on the
+/// flange, with the stripe or the pointer's spot as meta.json states (`beam`). Everything that they share is solved
+/// at once. The scatter of corners, stripe, spots and robot is estimated from the residuals and sets their weights.
+/// The verdict is the expected error of a scanned point in the working volume, with its sources, beside that of
+/// separate calibrations. docs/joint.md explains it.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight calibrate joint recordings/intrinsics recordings/handeye recordings/laserplane \\
       recordings/pointer --poses poses --station cell3
-  sheetlight calibrate joint recordings/* --station cell3")]
+  sheetlight calibrate joint recordings/* --station cell3
+Guide: docs/joint.md")]
 pub struct Args {
     /// Recording folders with meta.json
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
-    /// Station folder that gets the calibrations
+    /// Station folder for the results
     #[arg(long)]
     station: PathBuf,
-    /// Pose file of the recordings with robot poses, without extension [default: the one meta.json names]
+    /// Pose file of the recordings with robot poses, without extension [default: the one in meta.json]
     #[arg(long)]
     poses: Option<String>,
     #[command(flatten)]
     mount: mount::Where,
-    /// Depths at which the expected error is stated: nearest and farthest, mm [default: station.toml's working volume, else
-    /// where boards were lit]
+    /// Nearest and farthest depth of the stated error, mm [default: the working volume, else where boards were lit]
     #[arg(long, num_args = 2, value_names = ["NEAR", "FAR"])]
     working_mm: Option<Vec<f64>>,
-    /// Part of a colour picture to use: red, green, blue or luma
+    /// Channel of a colour picture: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
-    /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
+    /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
     #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
     #[command(flatten)]

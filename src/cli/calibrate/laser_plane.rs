@@ -13,31 +13,31 @@ use crate::station::volume::asked;
 use crate::station::{LaserPlaneRun, Settings, calibrate_laser_plane};
 use std::path::PathBuf;
 
-/// Find the laser plane from pictures of the stripe on boards
+/// Calibrate the laser plane from pictures of the stripe on boards
 ///
-/// Each frame has an ambient picture, which gives the board's pose, and a laser picture of the same
-/// pose. Room light that the laser picture holds too is taken out. The stripe is found as in a scan; only
-/// what lies on the board and away from the print's edges counts. The camera's calibration is held; its uncertainty is carried over.
+/// Each frame has an ambient picture, which gives the board's pose, and a laser picture of the same pose. Room light
+/// in the laser picture is subtracted. The stripe is found as in a scan. Only peaks on the board and away from the
+/// print's edges count. The camera's calibration is fixed, and its uncertainty is propagated.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight calibrate laser-plane recordings/laserplane --station cell3")]
+  sheetlight calibrate laser-plane recordings/laserplane --station cell3
+Guide: docs/calibration.md")]
 pub struct Args {
-    /// Recording folder: an ambient and a laser picture per frame
+    /// Recording with an ambient and a laser picture per frame
     recording: PathBuf,
     /// Station folder with the camera's calibration
     #[arg(long)]
     station: PathBuf,
-    /// Nearest depth at which the result is judged, mm [default: the working volume of station.toml, else where the boards
-    /// were lit]
-    #[arg(long, requires = "far_mm")]
+    /// Nearest depth at which the result is judged, mm [default: station.toml's, else where boards were lit]
+    #[arg(long, value_name = "MM", requires = "far_mm")]
     near_mm: Option<f64>,
     /// Farthest depth at which the result is judged, mm
-    #[arg(long, requires = "near_mm")]
+    #[arg(long, value_name = "MM", requires = "near_mm")]
     far_mm: Option<f64>,
-    /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
+    /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
     #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
-    /// Part of a colour picture to use: red, green, blue or luma
+    /// Channel of a colour picture: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
     #[command(flatten)]

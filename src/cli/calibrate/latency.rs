@@ -1,4 +1,5 @@
-//! In: a recording of a part that was passed to and fro, paired by clock. Out: by how much pictures are late against poses, stored in the station.
+//! In: a recording of a part that was passed to and fro, paired by clock. Out: by how much pictures are late against
+//! poses, stored in the station.
 //! Frame and unit: ms.
 
 use crate::cli::terminal::console::Console;
@@ -9,26 +10,28 @@ use crate::scan::Where;
 use crate::station::{Settings, calibrate_latency};
 use std::path::PathBuf;
 
-/// Find by how much the camera's times are late against the poses'
+/// Find the delay between picture times and pose times
 ///
-/// A part with slopes, or with edges that lie slanted to the stripe, is passed to and fro at a steady speed and recorded with --pair clock. A
-/// delay shifts it one way on the way there and the other way on the way back; what brings both together is the delay. It is kept as
-/// calibration/latency.json of the station, and record and scan apply it to what is paired by clock.
+/// A part with slopes, or with edges slanted to the stripe, is passed back and forth at a steady speed and recorded
+/// with --pair clock. A delay shifts the part one way on the way there and the other way on the way back. The delay
+/// that brings both together is stored as calibration/latency.json of the station. record and scan apply it to
+/// pictures that are paired by clock.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight record --camera gige://first --pair clock --pose-stream bcap://10.0.0.2 \\
-      --out recordings/to-and-fro
-  sheetlight calibrate latency recordings/to-and-fro --station cell3")]
+      --out recordings/back-and-forth
+  sheetlight calibrate latency recordings/back-and-forth --station cell3
+Guide: docs/live.md")]
 pub struct Args {
     /// Recording folder
     recording: PathBuf,
     /// Station folder
     #[arg(long)]
     station: PathBuf,
-    /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
+    /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
     #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
-    /// Say what is found, keep nothing
+    /// Print the result and store nothing
     #[arg(long)]
     dry_run: bool,
 }

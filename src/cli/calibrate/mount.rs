@@ -9,9 +9,8 @@ use std::path::Path;
 /// Where the camera is.
 #[derive(clap::Args)]
 pub struct Where {
-    /// Where the camera is: eye-in-hand (on the flange) or eye-to-hand (it stands still, and the flange carries the
-    /// board); refused where the station says otherwise [default: station.toml's mount, else that of the station's
-    /// stored record, else eye-in-hand, which is said then]
+    /// Where the camera is: eye-in-hand (on the flange) or eye-to-hand (fixed) [default: the station's, else
+    /// eye-in-hand with a note]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Mount>)]
     mount: Option<Mount>,
 }

@@ -13,27 +13,27 @@ use crate::station::volume::asked;
 use crate::station::{PointerRun, Settings, calibrate_pointer};
 use std::path::PathBuf;
 
-/// Find the laser pointer's beam from pictures of its spot on boards
+/// Calibrate the laser pointer's beam from pictures of its spot on boards
 ///
-/// Each frame has an ambient picture, which gives the board's pose, and a laser picture of the same
-/// pose. Room light that the laser picture holds too is taken out. The camera's calibration is held; its uncertainty is carried over.
+/// Each frame has an ambient picture, which gives the board's pose, and a laser picture of the same pose. Room light
+/// in the laser picture is subtracted. The camera's calibration is fixed, and its uncertainty is propagated.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight calibrate pointer recordings/pointer_cal --station cell3")]
+  sheetlight calibrate pointer recordings/pointer_cal --station cell3
+Guide: docs/calibration.md")]
 pub struct Args {
-    /// Recording folder: an ambient and a laser picture per frame
+    /// Recording with an ambient and a laser picture per frame
     recording: PathBuf,
     /// Station folder with the camera's calibration
     #[arg(long)]
     station: PathBuf,
-    /// Nearest depth at which the result is judged, mm [default: the working volume of station.toml, else where the spots
-    /// lay]
-    #[arg(long, requires = "far_mm")]
+    /// Nearest depth at which the result is judged, mm [default: station.toml's, else where spots were]
+    #[arg(long, value_name = "MM", requires = "far_mm")]
     near_mm: Option<f64>,
     /// Farthest depth at which the result is judged, mm
-    #[arg(long, requires = "near_mm")]
+    #[arg(long, value_name = "MM", requires = "near_mm")]
     far_mm: Option<f64>,
-    /// Part of a colour picture to use: red, green, blue or luma
+    /// Channel of a colour picture: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
     #[command(flatten)]

@@ -11,40 +11,40 @@ use crate::robot::Convention;
 use crate::station::{Settings, calibrate_profile_hand_eye, evaluate_profile_hand_eye};
 use std::path::{Path, PathBuf};
 
-/// Find a line-profile sensor's pose on the flange from profiles of a ball and the robot's poses
+/// Calibrate a line-profile sensor's pose on the flange with a ball
 ///
-/// The sensor measures x along its line and z away from it, both mm; y = z × x. The ball stands still.
-/// On which side of the profile plane its centre lies must be told by the data, or be stated.
-/// With --evaluate nothing is calibrated: a transform from elsewhere is put to the test.
+/// The sensor measures x along its line and z away from it, both mm; y = z × x. The ball stands still. The side of
+/// the profile plane on which its centre lies must follow from the data or be stated. With --evaluate nothing is
+/// calibrated: a given transform is tested.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight calibrate profile-hand-eye profiles/ --poses BALL.LS \\
       --ball-diameter-mm 30 --station cell3
   sheetlight calibrate profile-hand-eye profiles/ --poses BALL.LS \\
-      --ball-diameter-mm 30 --evaluate theirs.json")]
+      --ball-diameter-mm 30 --evaluate theirs.json
+Guide: docs/file-formats.md")]
 pub struct Args {
-    /// A folder with a profile a file, or one file with all: CSV (x, z), OpenCV YAML, or plain sequences of numbers
+    /// Folder with one profile per file, or one file with all: CSV (x, z), OpenCV YAML, or plain numbers
     profiles: PathBuf,
     /// Poses in the profiles' order: CSV or JSON as in a recording, or a FANUC listing (.LS)
     #[arg(long)]
     poses: PathBuf,
     /// Diameter of the ball, mm
-    #[arg(long)]
+    #[arg(long, value_name = "MM")]
     ball_diameter_mm: f64,
-    /// Side of the ball's centre: plus (y > 0 of the sensor, y = z × x) or minus [default: the data must tell]
+    /// Side of the ball's centre: plus (y > 0 of the sensor, y = z × x) or minus [default: from the data]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Side>)]
     side: Option<Side>,
-    /// z of a point where nothing was measured, mm; points that are not finite are always left out
+    /// z that means "not measured", mm; values that are not finite are always skipped
     #[arg(long, value_name = "Z", allow_negative_numbers = true)]
     missing: Option<f64>,
-    /// Station folder that the result is stored in
+    /// Station folder for the result
     #[arg(long, required_unless_present = "evaluate")]
     station: Option<PathBuf>,
-    /// Depth of the sensor (its z) at which the expected error is stated, mm [default: the middle of where the profiles'
-    /// points lie]
-    #[arg(long, allow_negative_numbers = true)]
+    /// Depth (the sensor's z) of the stated error, mm [default: middle of the points]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     working_mm: Option<f64>,
-    /// JSON with flange_T_sensor (a profile_hand_eye.json, or 16 numbers under that key): say how well it fits
+    /// Test a transform: JSON with flange_T_sensor (16 numbers, or a stored profile_hand_eye.json)
     #[arg(long, conflicts_with_all = ["station", "side"])]
     evaluate: Option<PathBuf>,
     #[command(flatten)]
@@ -75,7 +75,8 @@ fn put_to_the_test(args: &Args, transform: &Path, options: &BallOptions, console
     let (found, warnings) = evaluate_profile_hand_eye(&args.profiles, &args.poses, transform, options)?;
     warnings.iter().for_each(|w| console.warn(w));
     let mut text = format!(
-        "the profiles' points lie on one ball of {:.3} mm to {:.4} mm rms; with the diameter left free on one of {:.3} mm to {:.4} mm\n",
+        "the profiles' points lie on one ball of {:.3} mm to {:.4} mm rms; with the diameter left free on one of \
+         {:.3} mm to {:.4} mm\n",
         options.diameter, found.rms, found.free_diameter, found.free_rms
     );
     text += &format!("ball in the base: {:.3} {:.3} {:.3} mm\n", found.ball.x, found.ball.y, found.ball.z);

@@ -1,4 +1,5 @@
-//! In: a calibration and its page. Out: both stored in the station, or refused where it is badly determined; what is said of it.
+//! In: a calibration and its page. Out: both stored in the station, or refused where it is badly determined; what is
+//! said of it.
 //! Frame and unit: none.
 
 use crate::calibrate::report::Page;
@@ -11,7 +12,7 @@ use std::path::Path;
 /// What happens to a result that is badly determined.
 #[derive(clap::Args)]
 pub struct Keep {
-    /// Store the result even where it is badly determined
+    /// Store the result even if it is badly determined
     #[arg(long)]
     keep_badly_determined: bool,
 }

@@ -1,4 +1,5 @@
-//! In: a camera. Out: what cameras there are, what one can be set to, one picture with what it shows, the exposure that suits the stripe.
+//! In: a camera. Out: what cameras there are, what one can be set to, one picture with what it shows, the exposure
+//! that suits the stripe.
 //! Frame and unit: features by the standard names (SFNC); px, us.
 
 use crate::capture::{CameraUri, PictureSource, RawFormat, Value, fresh, look, tune, unexposed};
@@ -18,45 +19,49 @@ pub enum Command {
     List,
     /// Show a camera's features with values, units and ranges
     #[command(after_help = "Example:
-  sheetlight camera show --camera gige://first")]
+  sheetlight camera show --camera gige://first
+Guide: docs/live.md")]
     Show(Named),
     /// Set a feature of a camera
     #[command(after_help = "Examples:
   sheetlight camera set ExposureTime 800 --camera gige://first
-  sheetlight camera set PixelFormat Mono12 --camera gige://first")]
+  sheetlight camera set PixelFormat Mono12 --camera gige://first
+Guide: docs/live.md")]
     Set {
-        /// Name by the standard: ExposureTime (us), Gain, Width, PixelFormat, AcquisitionFrameRate, TriggerMode ...
+        /// Feature name: ExposureTime (us), Gain, Width, PixelFormat, AcquisitionFrameRate, TriggerMode, ...
         key: String,
-        /// What it is to be
+        /// New value
         value: String,
         #[command(flatten)]
         named: Named,
     },
-    /// Take one picture and say what it shows
+    /// Take one picture and report its levels
     #[command(after_help = "Example:
-  sheetlight camera snap now.png --camera gige://first --station cell3")]
+  sheetlight camera snap now.png --camera gige://first --station cell3
+Guide: docs/live.md")]
     Snap {
         /// PNG file
         out: PathBuf,
         #[command(flatten)]
         named: Named,
-        /// Station folder: the stripe as it is found is drawn beside, OUT_stripe.png
+        /// Station folder: also draw the found stripe into OUT_stripe.png
         #[arg(long)]
         station: Option<PathBuf>,
     },
-    /// Find the exposure at which the stripe's peaks stand at 70 to 85 % of full scale, and leave it set
+    /// Set the exposure automatically: peaks of the stripe at 70 to 85 % of full scale
     #[command(after_help = "Example:
-  sheetlight camera tune --camera gige://first")]
+  sheetlight camera tune --camera gige://first
+Guide: docs/live.md")]
     Tune(Named),
 }
 
 /// The camera that is meant.
 #[derive(clap::Args)]
 pub struct Named {
-    /// Which camera: gige://first, ffmpeg:/dev/video0, cell://HOST:PORT, sim:SEED, ... (docs/live.md)
+    /// Camera: gige://first, ffmpeg:/dev/video0, cell://HOST:PORT, sim:SEED, ... (docs/live.md)
     #[arg(long, value_name = "URI", value_parser = parse::<CameraUri>)]
     camera: CameraUri,
-    /// Frames on standard input, with --camera -: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
+    /// Raw frames on standard input, with --camera -: WIDTHxHEIGHT:gray8, gray10le, ...
     #[arg(long, value_parser = parse::<RawFormat>)]
     raw: Option<RawFormat>,
 }

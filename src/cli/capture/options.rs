@@ -69,24 +69,23 @@ impl std::str::FromStr for Moves {
 /// A running camera.
 #[derive(Clone, clap::Args)]
 pub struct Running {
-    /// Where pictures come from: gige://first, ffmpeg:/dev/video0, folder:PATH, cell://HOST:PORT, sim:SEED, play:RECORDING, or -
-    /// (raw frames on standard input, with --raw); docs/live.md has them all
+    /// Camera: gige://first, ffmpeg:/dev/video0, folder:PATH, play:RECORDING, ... (docs/live.md)
     #[arg(long, value_name = "URI", value_parser = parse::<CameraUri>)]
     pub camera: Option<CameraUri>,
-    /// End after so many pictures
+    /// End after this number of pictures
     #[arg(long, requires = "camera")]
     shots: Option<u64>,
     /// End after this time, s
-    #[arg(long, requires = "camera")]
+    #[arg(long, hide_short_help = true, requires = "camera")]
     seconds: Option<f64>,
-    /// How long a camera that went away is waited for, s
-    #[arg(long, default_value_t = 60.0)]
+    /// Time to wait for a camera that was disconnected, s
+    #[arg(long, hide_short_help = true, default_value_t = 60.0)]
     patience: f64,
-    /// Memory for pictures that wait, MB
-    #[arg(long, default_value_t = 256)]
+    /// Memory for pictures that are waiting, MB
+    #[arg(long, hide_short_help = true, default_value_t = 256)]
     memory: usize,
-    /// Write the counters into this file every second, as Prometheus' node exporter reads it
-    #[arg(long, value_name = "FILE", requires = "camera")]
+    /// Write the counters into this file every second, for Prometheus' node exporter
+    #[arg(long, hide_short_help = true, value_name = "FILE", requires = "camera")]
     metrics: Option<PathBuf>,
     #[command(flatten)]
     pub readout: ReadoutArgs,
@@ -97,19 +96,18 @@ pub struct Running {
 pub struct Capture {
     #[command(flatten)]
     pub running: Running,
-    /// With --camera: how pictures are paired with what moves: none, given (the source says), step (everything stands still), count (by
-    /// number) or clock (by time)
+    /// Pairing of pictures and poses: none, given (by the source), step (standing still), count (by number) or clock
+    /// (by time)
     #[arg(long, value_parser = parse::<Pair>, requires = "camera")]
     pub pair: Option<Pair>,
-    /// With --camera: what moves: robot, robot:part, linear:count, linear:mm, turntable:count or turntable:deg
+    /// What moves: robot, robot:part, linear:count, linear:mm, turntable:count or turntable:deg
     #[arg(long, default_value = "robot", value_parser = parse::<Moves>)]
     motion: Moves,
-    /// With --pair step or clock: where poses or counts come from: bcap://HOST and other robots, tcp://HOST:PORT or lines:PATH (lines of
-    /// t_ns and a pose), sim:SEED
+    /// Source of poses or counts for --pair step and clock: bcap://HOST, tcp://HOST:PORT, lines:PATH, sim:SEED
     #[arg(long, value_name = "URI", value_parser = parse::<PoseUri>, requires = "camera")]
     pose_stream: Option<PoseUri>,
-    /// With --pair count: counts from one trigger pulse to the next
-    #[arg(long, requires = "camera")]
+    /// Counts from one trigger pulse to the next, for --pair count
+    #[arg(long, value_name = "N", requires = "camera")]
     counts_per_shot: Option<f64>,
 }
 
@@ -202,7 +200,7 @@ impl Capture {
     fn way(&self, uri: &CameraUri, poses: Option<&Path>, latency: Option<&Latency>) -> Result<Way> {
         let stream = || {
             let uri_of = self.pose_stream.as_ref().ok_or_else(|| {
-                Fault::usage("--pair step and clock need to know where things stand while pictures are taken")
+                Fault::usage("--pair step and clock need a stream of poses")
                     .next("name it: --pose-stream bcap://HOST, tcp://HOST:PORT or lines:PATH")
             })?;
             let sim = if let CameraUri::Sim(spec) = uri { Some(spec) } else { None };
@@ -223,9 +221,15 @@ impl Capture {
                 (None, Some(step)) if self.motion.0.axis().is_some() => Table::Pulses(step),
                 (None, None) if self.motion.0.axis().is_some() => Table::Chunk,
                 _ => {
-                    return Err(Fault::usage("--pair count needs one table of where things stood")
-                        .cause("a robot's poses by number, or an axis that triggers the camera or counts into its pictures")
-                        .next("give --poses FILE, or --motion linear:count with --counts-per-shot N or a camera that sends its count"));
+                    return Err(Fault::usage("--pair count needs one table of poses or counts")
+                        .cause(
+                            "a robot's poses by number, or an axis that triggers the camera or counts into its \
+                                pictures",
+                        )
+                        .next(
+                            "give --poses FILE, or --motion linear:count with --counts-per-shot N or a camera that \
+                               sends its count",
+                        ));
                 }
             })),
         })

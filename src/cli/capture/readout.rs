@@ -5,13 +5,13 @@ use crate::camera::Readout;
 /// What pictures show of the sensor.
 #[derive(Clone, clap::Args)]
 pub struct ReadoutArgs {
-    /// Pictures that are smaller than the calibrated ones are a region of the sensor; this is its left upper corner
-    /// (OffsetX and OffsetY of the camera); only where neither camera nor meta.json says so
-    #[arg(long, value_name = "X,Y", value_parser = crate::cli::terminal::arguments::parse::<Corner>)]
+    /// Left upper corner of the sensor region that the pictures show (OffsetX, OffsetY), if neither camera nor
+    /// meta.json states it
+    #[arg(long, hide_short_help = true, value_name = "X,Y",
+        value_parser = crate::cli::terminal::arguments::parse::<Corner>)]
     region: Option<Corner>,
-    /// Pictures that are smaller than the calibrated ones are binned: so many pixels each way are one; only where
-    /// neither camera nor meta.json says so
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    /// Binning of the pictures in both directions, if neither camera nor meta.json states it
+    #[arg(long, hide_short_help = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     binned: Option<u32>,
     /// Pictures of another size show the same view as those of the calibration, at another resolution; only where
     /// neither camera nor meta.json says what they show
@@ -29,7 +29,7 @@ impl std::str::FromStr for Corner {
         let numbers: Vec<u32> = s.split(',').map_while(|w| w.trim().parse().ok()).collect();
         <[u32; 2]>::try_from(numbers)
             .map(Corner)
-            .map_err(|_| format!("'{s}' is no corner: two whole numbers, 1024,768"))
+            .map_err(|_| format!("'{s}' is not a corner: two whole numbers, 1024,768"))
     }
 }
 

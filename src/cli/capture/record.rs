@@ -10,11 +10,11 @@ use crate::fault::{Fault, Result};
 use crate::recording::BoardSpec;
 use std::path::PathBuf;
 
-/// Record a running camera: every picture in order, each with where things stood
+/// Record a running camera: every picture in order, with its pose
 ///
-/// Ends after --shots, --seconds, or Ctrl-C. The recording can be opened at any moment, also after a crash: what was written is whole.
-/// What became of every picture that the camera sent is in the account: complete, incomplete, missed by the camera, late, dropped
-/// (queue, disk), unpaired. Pictures without a pose are left out and listed in left_out.json.
+/// Ends after --shots, --seconds, or Ctrl-C. The recording can be opened at any moment, also after a crash. The
+/// account lists every picture that the camera sent: complete, incomplete, missed, late, dropped (queue, disk) or
+/// unpaired. Pictures without a pose are excluded and listed in left_out.json.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight record --camera gige://first --out recordings/board7 --shots 400
@@ -24,29 +24,31 @@ use std::path::PathBuf;
       --counts-per-shot 20 --out recordings/parcel4
   sheetlight record --camera ffmpeg:/dev/video0 --shows room --board boards/charuco.json \\
       --shots 20 --out recordings/boards
-  sheetlight record --camera sim:1?rate=10 --pair given --shots 50 --out try/scan")]
+  sheetlight record --camera sim:1?rate=10 --pair given --shots 50 --out try/scan
+All options: sheetlight help record
+Guide: docs/live.md")]
 pub struct Args {
     #[command(flatten)]
     capture: Capture,
-    /// Frames on standard input, with --camera -: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
+    /// Raw frames on standard input, with --camera -: WIDTHxHEIGHT:gray8, gray10le, ...
     #[arg(long, value_parser = parse::<RawFormat>)]
     raw: Option<RawFormat>,
-    /// With --pair count: poses by number (JSON or CSV)
+    /// Poses by number (JSON or CSV), for --pair count
     #[arg(long)]
     poses: Option<PathBuf>,
     /// Station folder, for its latency
     #[arg(long)]
     station: Option<PathBuf>,
-    /// Folder for the recording; must hold none
+    /// Folder for the recording; must not hold one
     #[arg(long)]
     out: PathBuf,
-    /// What the pictures show: line (the stripe), pointer (its spot) or room (a board, the lasers off)
+    /// Pictures of: line (the stripe), pointer (its spot) or room (a board, lasers off)
     #[arg(long, default_value = "line", value_parser = parse::<Shows>)]
     shows: Shows,
-    /// The board that they show (JSON as sheetlight board writes it)
+    /// Board in the pictures (JSON from sheetlight board)
     #[arg(long)]
     board: Option<PathBuf>,
-    /// How they are stored: png, raw (one file of raw frames), auto (raw where PNG is too slow)
+    /// Storage: png, raw (one file of raw frames), auto (raw if PNG is too slow)
     #[arg(long, default_value = "auto", value_parser = parse::<Store>)]
     store: Store,
 }
@@ -80,7 +82,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     if report.shots == 0 {
         return Err(Fault::refused(format!("no picture was recorded: {}", report.account))
             .cause("the camera waits for a trigger, or no picture could be paired")
-            .next("see what the camera does: sheetlight camera show; left_out.json has the reasons"));
+            .next("check the camera with: sheetlight camera show; left_out.json has the reasons"));
     }
     Ok(())
 }
@@ -92,7 +94,7 @@ fn summary(r: &RecordReport, args: &Args) -> String {
         s += &format!("{} pictures are unexplained\n", r.account.unexplained());
     }
     if let Some(first) = r.left_out.first() {
-        s += &format!("left out {} pictures, the first ({}): {}\n", r.account.unpaired, first.id, first.why);
+        s += &format!("excluded {} pictures, the first ({}): {}\n", r.account.unpaired, first.id, first.why);
     }
     s
 }

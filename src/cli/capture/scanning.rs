@@ -28,7 +28,8 @@ pub struct Taken<'a> {
     pub ambient: &'a dyn Fn(Format) -> Result<Option<Image>>,
 }
 
-/// Scans a camera while it runs. With `keep` it is recorded there, and what cannot be scanned in time waits on that disk.
+/// Scans a camera while it runs. With `keep` it is recorded there, and what cannot be scanned in time waits on that
+/// disk.
 pub fn scan_camera(
     &Taken { capture, raw, poses, station, keep, ambient }: &Taken<'_>,
     rig: &Rig,
@@ -37,7 +38,7 @@ pub fn scan_camera(
     bar: &ProgressBar,
 ) -> Result<ScanReport> {
     let motion = capture.motion().ok_or_else(|| {
-        Fault::usage("a scan needs to know where things stood at each picture, and --pair says none")
+        Fault::usage("a scan needs a pose for each picture, but --pair none gives no poses")
             .next("say how pictures are paired: --pair given, step, count or clock (docs/live.md)")
     })?;
     if options.resume {

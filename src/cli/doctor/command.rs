@@ -1,5 +1,5 @@
-//! In: this machine. Out: its adapters, every stage compared with its CPU twin, transfer rates, the time of a shot, and a
-//! plain verdict, each as soon as it is known.
+//! In: this machine. Out: its adapters, every stage compared with its CPU twin, transfer rates, the time of a shot,
+//! and a plain verdict, each as soon as it is known.
 //! Frame and unit: words that differ, or the stage's own measure; GB/s, ms.
 
 use super::trial;
@@ -9,21 +9,20 @@ use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::gpu::{AdapterInfo, Rates, adapters};
 
-/// Check this machine: adapters, every stage against its CPU twin, transfer rates, the time of a shot with and without the GPU
+/// Check this machine: GPU, every stage against its CPU twin, transfer rates
 ///
-/// Exit code 0 when the GPU chain can be trusted or when there is no GPU at all (everything then runs
-/// on this machine's processor); 1 when a stage differs from its twin, or its driver takes too long or too much memory
-/// to compile it.
+/// Exit code 0 if the GPU chain can be trusted, or if there is no GPU (everything then runs on the processor). Exit
+/// code 1 if a stage differs from its twin, or its driver takes too long or too much memory to compile it.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Leave out the transfer rates and the times of a shot (they take some seconds)
+    /// Skip the transfer rates and the times of a shot, which take some seconds
     #[arg(long)]
     no_rates: bool,
     /// Processor time that one stage may take, s
-    #[arg(long, default_value_t = 60.0)]
+    #[arg(long, value_name = "S", default_value_t = 60.0)]
     stage_seconds: f64,
     /// Memory that the stages may take, MiB
-    #[arg(long, default_value_t = 2048)]
+    #[arg(long, value_name = "MIB", default_value_t = 2048)]
     stage_mib: u64,
     /// For doctor itself: run the stages from this one on, and tell of each as a line of JSON
     #[arg(long, hide = true)]
@@ -82,7 +81,8 @@ impl Findings {
             Event::Device { name, reads_texels } if self.used.is_none() => {
                 if reads_texels {
                     console.part(
-                        "stages read arrays as texels of images on the same memory, which is faster on a software adapter",
+                        "stages read arrays as texels of images on the same memory, which is faster on a software \
+                         adapter",
                     );
                 }
                 (self.used, self.reads_texels) = (Some(name), reads_texels);
@@ -123,7 +123,8 @@ fn verdict(used: Option<&str>, wrong: &[&str]) -> String {
 
 fn adapter(a: &AdapterInfo) -> String {
     format!(
-        "adapter {} ({}, {}), driver {}\n  binds {} MiB, {} buffers a stage, workgroups of {}, {}timestamps, {} memory\n",
+        "adapter {} ({}, {}), driver {}\n  binds {} MiB, {} buffers a stage, workgroups of {}, {}timestamps, {} \
+         memory\n",
         a.name,
         a.kind,
         a.backend,

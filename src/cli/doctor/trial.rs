@@ -1,5 +1,5 @@
-//! In: the stages. Out: how each does on this machine's adapter, tried in a process of its own: a driver that does not come
-//! back, takes all memory or ends the process costs one stage, not the check.
+//! In: the stages. Out: how each does on this machine's adapter, tried in a process of its own: a driver that does
+//! not come back, takes all memory or ends the process costs one stage, not the check.
 //! Frame and unit: processor seconds, MiB.
 
 use crate::bench::{WayTime, way_times};
@@ -116,7 +116,8 @@ pub fn run(from: usize, rates: bool, console: &Console) -> Result<()> {
 /// Looks at a process this often.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Tries every stage, each within the limits; `tell` is told at once. No rates where a stage was ended: the chain needs it.
+/// Tries every stage, each within the limits; `tell` is told at once. No rates where a stage was ended: the chain
+/// needs it.
 pub fn watch(limits: &Limits, mut rates: bool, tell: &mut dyn FnMut(Event)) -> Result<()> {
     let names: Vec<&str> = stages::all().iter().map(|e| e.stage.name).collect();
     let mut next = 0;

@@ -1,4 +1,5 @@
-//! In: recordings, a station, a recipe. Out: a scan of each and what was found in it, one after the other; a table, and how the places repeat.
+//! In: recordings, a station, a recipe. Out: a scan of each and what was found in it, one after the other; a table,
+//! and how the places repeat.
 //! Frame and unit: the scans' frame; mm, degrees.
 
 use crate::cli::terminal::arguments::{changes, parse};
@@ -12,35 +13,36 @@ use crate::scan::Where;
 use crate::station::{Batch, BatchOptions, BatchRow, Settings, Spread, batch};
 use std::path::PathBuf;
 
-/// Scan several recordings and look for a part in each; tell how the places repeat
+/// Scan several recordings, find a part in each, report how the poses repeat
 ///
-/// Leaves a scan folder for each recording, found.json and found.png beside it, and of all together batch.json and batch.csv. Where
-/// the part stood still between the recordings, the scatter of its places stands beside what each place said of itself. A recording
-/// that fails is named with its reason, and the others go on; the exit code is 1 then.
+/// Writes a scan folder for each recording, found.json and found.png beside it, and batch.json and batch.csv for all.
+/// If the part stood still between the recordings, the scatter of its poses stands beside the stated sigmas. A
+/// recording that fails is named with its reason, the others continue, and the exit code is 1.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight batch recordings/a recordings/b recordings/c --station cell3 \\
-      --recipe data/recipes/led.toml --set threshold.minimum=14 --out batch1")]
+      --recipe data/recipes/led.toml --set threshold.minimum=14 --out batch1
+Guide: docs/finding-and-inserting.md")]
 pub struct Args {
-    /// Recording folders, in the order in which they are scanned
+    /// Recording folders, scanned in this order
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
     /// Station folder with the calibration
     #[arg(long)]
     station: PathBuf,
-    /// Recipe (TOML) of the part; without it recordings are scanned only
+    /// Recipe (TOML) of the part; without it the recordings are only scanned
     #[arg(long)]
     recipe: Option<PathBuf>,
-    /// A setting of [extraction] other than the station's, several times
+    /// Change a setting of [extraction]; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<String>,
     /// Folder for scans and tables
     #[arg(long)]
     out: PathBuf,
-    /// Where the stages run: auto, gpu, or cpu
+    /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
     #[arg(long, default_value = "auto", value_parser = parse::<Where>)]
     on: Where,
-    /// Notation of the poses [default: the station's robot, else matrix]
+    /// Notation of the poses (docs/conventions.md) [default: the station's, else matrix]
     #[arg(long, value_parser = parse::<Convention>)]
     robot: Option<Convention>,
 }
@@ -67,9 +69,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     if failed == 0 {
         return Ok(());
     }
-    Err(Fault::refused(format!("{failed} of {} recordings came to no place", done.rows.len()))
-        .cause("what stands behind each of them")
-        .next("look at the table; their scans are kept"))
+    Err(Fault::refused(format!("{failed} of {} recordings gave no pose", done.rows.len()))
+        .cause("the reason beside each of them")
+        .next("look at the table; their scans are stored"))
 }
 
 fn line(r: &BatchRow) -> String {

@@ -8,22 +8,25 @@ use crate::scan::Filter;
 use crate::station::{filter_scan, of_a_scan};
 use std::path::PathBuf;
 
-/// Take glints, dust and what does not matter out of a scan
+/// Remove glints, dust and unwanted regions from a scan
 ///
-/// Filters take cells of the height map and their points away, one after the other, and make nothing up: what stays is as it was
-/// measured. The result is a scan folder of its own; its scan.json says what was done and how many cells each filter took.
+/// Filters remove cells of the height map and their points, one after the other. They change and add nothing. The
+/// result is a scan folder of its own; its scan.json lists the filters and how many cells each removed.
 ///
-/// sigma:MM takes cells whose standard deviation is larger; heights:LOW,HIGH those outside a range; cut:X0,Y0,X1,Y1 what lies in a box,
-/// keep:X0,Y0,X1,Y1 what lies outside one; islands:CELLS,STEP pieces of surface of fewer cells, where neighbours that differ by more
-/// than STEP mm are of two pieces. Places are millimetres from the map's corner, heights above its plane.
+/// Filter sigma:MM removes cells with a larger standard deviation. Filter heights:LOW,HIGH removes those outside a
+/// range. Filter cut:X0,Y0,X1,Y1 removes a box, keep:X0,Y0,X1,Y1 everything outside a box. Filter islands:CELLS,STEP
+/// removes pieces of surface with fewer cells; neighbours that differ by more than STEP mm belong to two pieces.
+/// Positions are millimetres from the map's corner, heights above its plane.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight filter scans/board7 --filter islands:20,0.5 --filter sigma:0.1 --out scans/clean7")]
+  sheetlight filter scans/board7 --filter islands:20,0.5 --filter sigma:0.1 --out scans/clean7
+Guide: docs/scanning.md")]
 pub struct Args {
-    /// Folder that sheetlight scan --out wrote
+    /// Folder from sheetlight scan --out
     scan: PathBuf,
-    /// A filter, several times, in their order
-    #[arg(long = "filter", required = true, value_parser = crate::cli::terminal::arguments::parse::<Filter>, allow_hyphen_values = true)]
+    /// Filter: sigma:MM, heights:LOW,HIGH, cut:X0,Y0,X1,Y1, keep:X0,Y0,X1,Y1 or islands:CELLS,STEP; may be repeated
+    #[arg(long = "filter", required = true, value_parser = crate::cli::terminal::arguments::parse::<Filter>,
+        allow_hyphen_values = true)]
     filters: Vec<Filter>,
     /// Folder for the filtered scan
     #[arg(long)]

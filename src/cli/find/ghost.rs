@@ -1,4 +1,5 @@
-//! In: a report of find, its recipe, a recording whose robot's poses are known. Out: the part's outlines over one of its pictures.
+//! In: a report of find, its recipe, a recording whose robot's poses are known. Out: the part's outlines over one of
+//! its pictures.
 //! Frame and unit: base frame, mm; px of the picture.
 
 use crate::cli::terminal::console::Console;
@@ -14,27 +15,29 @@ use std::path::PathBuf;
 
 const COLOUR: [u8; 3] = [0, 230, 255];
 
-/// Draw a part that was found into a picture of the camera on the gripper
+/// Draw a found part into a picture of the robot's camera
 ///
-/// The outlines go where the found pose, the hand-eye and the camera say; where they lie beside the part one of these is wrong. The
-/// picture may be any one of the same station whose robot pose is known: seen from elsewhere than the scan it is a witness.
+/// The outlines lie where found pose, hand-eye and camera place them. If they lie beside the part, one of these is
+/// wrong. Any picture of the same station with a robot pose can be used; a picture from another side than the scan is
+/// an independent check.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight ghost led.json --recipe data/recipes/led.toml --recording recordings/board7 \\
-      --station cell3 --out ghost.png")]
+      --station cell3 --out ghost.png
+Guide: docs/operator.md")]
 pub struct Args {
-    /// Report that sheetlight find --out wrote
+    /// Report from sheetlight find --out
     found: PathBuf,
-    /// The recipe that was looked for
+    /// Recipe of the found part
     #[arg(long)]
     recipe: PathBuf,
     /// Recording with the robot's poses
     #[arg(long)]
     recording: PathBuf,
-    /// Frame of the recording, from 0 [default: the one whose picture shows the part nearest to its middle]
+    /// Frame of the recording, from 0 [default: the one with the part closest to the picture's middle]
     #[arg(long)]
     frame: Option<usize>,
-    /// Pose file of the recording, where it has several
+    /// Pose file of the recording, if it has several
     #[arg(long)]
     poses: Option<String>,
     /// Station folder

@@ -8,14 +8,14 @@ use crate::scan::Stated;
 use crate::station::{ScanReport, import_map};
 use std::path::PathBuf;
 
-/// Take in a height map or cloud of another sensor, so that find works on it
+/// Import a height map or cloud of another sensor, so that find works on it
 ///
-/// Reads TIFF and BigTIFF (whole numbers of 1 to 64 bits with or without sign, floats of 16, 32 and 64 bits), PNG, PGM and
-/// BMP whose levels are heights, PLY (text, binary) and PCD (text, binary, compressed). What the file says about its levels
-/// (orientation, missing level, scale, transparency) is honoured. Units, distances and the level that means nothing was
-/// measured are stated, never guessed; how much heights scatter is measured unless stated. The result is a scan folder with
-/// cloud, height map and scan.json, which names the file and its hash. Its frame is called map: poses that find gives are in
-/// it, not in a robot's base, and no calibration is in their error budget.
+/// Reads pictures whose levels are heights: TIFF and BigTIFF (whole numbers of 1 to 64 bits with or without sign,
+/// floats of 16, 32 and 64 bits), PNG, PGM and BMP. It also reads clouds: PLY (text, binary) and PCD (text, binary,
+/// compressed). What the file states about its levels (orientation, missing level, scale, transparency) is honoured.
+/// Units, distances and the missing level are stated and never guessed. The scatter of heights is measured unless
+/// stated. The result is a scan folder with cloud, height map and scan.json. Its frame is called map: poses of find
+/// are in it, not in a robot's base, and no calibration enters their error budget.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight import-map plate.png --unit-mm 0.02 --spacing-mm 0.216,0.209 --missing 0 \\
@@ -23,34 +23,35 @@ use std::path::PathBuf;
   sheetlight import-map heights.tif --unit-mm 1 --spacing-mm 0.1,0.1 --out scans/heights
   sheetlight import-map cloud.pcd --unit-mm 1000 --out scans/cloud
   sheetlight import-map cloud.ply --unit-mm 1 --spacing-mm 0.2,0.2 --out scans/cloud
-  sheetlight find scans/plate --recipe star.toml --out star.json")]
+  sheetlight find scans/plate --recipe star.toml --out star.json
+Guide: docs/match.md")]
 pub struct Args {
     /// Height picture, PLY or PCD
     file: PathBuf,
-    /// mm in one level of a picture, or in one unit of a cloud's coordinates: 1 for mm, 1000 for m
-    #[arg(long)]
+    /// mm per level of a picture, or per unit of a cloud's coordinates: 1 for mm, 1000 for m
+    #[arg(long, value_name = "MM")]
     unit_mm: Option<f64>,
-    /// Distance of a picture's columns and of its rows, mm; for a cloud without lines the distance of its points
+    /// Distance of columns and of rows, mm; for a cloud without lines, of its points
     #[arg(long, value_name = "X,Y", value_parser = numbers::<2>)]
     spacing_mm: Option<[f64; 2]>,
     /// Height of a picture's level 0, mm
-    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(long, value_name = "MM", default_value_t = 0.0, allow_hyphen_values = true)]
     offset_mm: f64,
-    /// Level of a picture, or z of a cloud in its own unit, where nothing was measured, or none; NaN is always missing
-    /// [default: the one that the file names]
+    /// Level (or z of a cloud in its unit) that means "not measured", or none; NaN is always missing [default: the
+    /// file's]
     #[arg(long, value_name = "LEVEL", value_parser = level, allow_hyphen_values = true)]
     missing: Option<Level>,
-    /// A picture whose rows run upwards, or that is seen from behind: y runs along the rows, not against them
+    /// The picture's rows run upwards, or it is seen from behind: y runs along the rows
     #[arg(long)]
     rows_up: bool,
-    /// Page of a TIFF that has several of full size, from 1 on
+    /// Page of a TIFF with several pages of full size, from 1
     #[arg(long)]
     page: Option<usize>,
-    /// Picture of the light that came with a height picture, of the same size
+    /// Intensity picture that belongs to a height picture, of the same size
     #[arg(long)]
     light: Option<PathBuf>,
     /// Standard deviation of a height, mm [default: measured from neighbours]
-    #[arg(long)]
+    #[arg(long, value_name = "MM")]
     sigma_mm: Option<f64>,
     /// Folder for cloud, height map and scan.json
     #[arg(long)]
@@ -63,7 +64,7 @@ struct Level(Option<f64>);
 
 fn level(s: &str) -> std::result::Result<Level, String> {
     let number = || s.parse().ok().filter(|v: &f64| v.is_finite());
-    if s == "none" { Ok(Level(None)) } else { number().map(|v| Level(Some(v))).ok_or(format!("'{s}' is no level")) }
+    if s == "none" { Ok(Level(None)) } else { number().map(|v| Level(Some(v))).ok_or(format!("'{s}' is not a level")) }
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {

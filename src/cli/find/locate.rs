@@ -14,44 +14,43 @@ use crate::robot::Convention;
 use crate::station::{Looked, Settings, find_part_in_all};
 use std::path::{Path, PathBuf};
 
-/// Find a part in a scan and say where the robot inserts
+/// Find a part in a scan and compute the insertion pose
 ///
-/// No pose leaves when a gate of the recipe is missed; the report says which, and the exit code is 1.
-///
-/// One scan cannot show what calibrations, delay, convention or robot got wrong. With a second scan of the same part from
-/// another side (sheetlight second-look plans it) the pose comes from both, and what they disagree about is a gate. What two looks
-/// and the part's own sizes could hide is stated and has its limits too; a third look, or distances of the pointer, show more.
+/// If a gate of the recipe is missed there is no pose: the report names the gate, and the exit code is 1. One scan
+/// cannot show errors of calibration, delay, convention or robot. With a second scan of the same part from another
+/// side (sheetlight second-look plans it) the pose comes from both, and their disagreement is a gate. The report also
+/// limits the errors that both scans could hide. A third scan, or distances of the pointer (--range), reveal more.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight find scans/board7 --recipe data/recipes/led.toml --station cell3 --out led.json
   sheetlight find scans/b7 scans/b7again --recipe led.toml --station cell3 --out led.json
   sheetlight find scans/b7 scans/b7again --range recordings/spots \\
-      --recipe led.toml --station cell3 --out led.json")]
+      --recipe led.toml --station cell3 --out led.json
+Guide: docs/finding-and-inserting.md")]
 pub struct Args {
-    /// Folders that sheetlight scan --out wrote: one, or several looks at the same part
+    /// Folders from sheetlight scan --out: one, or several scans of the same part
     #[arg(required = true)]
     scans: Vec<PathBuf>,
-    /// Recording of the pointer's spot on plain places of the part, with the robot's poses: a witness of the height that the
-    /// laser plane has no part in
+    /// Recording of the pointer's spot on plain surfaces of the part, with robot poses; checks the height
     #[arg(long, value_name = "RECORDING")]
     range: Option<PathBuf>,
-    /// Recipe (TOML): the part's drawing, constructions, insertion, gates
+    /// Recipe (TOML) of the part
     #[arg(long)]
     recipe: PathBuf,
-    /// File for the report (JSON); the picture goes beside it with .png
+    /// File for the report (JSON); a picture (.png) is written beside it
     #[arg(long)]
     out: PathBuf,
-    /// Station that scanned: its covariances enter the error budget, its calibration must be the scan's
+    /// Station of the scan; its covariances enter the error budget
     #[arg(long)]
     station: Option<PathBuf>,
-    /// Notation of the poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion, matrix, densot, gba or kawasaki [default:
-    /// the station's robot, else matrix]
+    /// Notation of the poses: denso, ur, kuka, ... (docs/conventions.md) [default: the station's, else matrix]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
     robot: Option<Convention>,
-    /// Direction towards the camera in the base frame [default: from the station, else 0,0,1]
-    #[arg(long, value_name = "X,Y,Z", value_parser = crate::cli::terminal::arguments::numbers::<3>, allow_hyphen_values = true)]
+    /// Direction towards the camera, base frame [default: from the station, else 0,0,1]
+    #[arg(long, value_name = "X,Y,Z", value_parser = crate::cli::terminal::arguments::numbers::<3>,
+        allow_hyphen_values = true)]
     up: Option<[f64; 3]>,
-    /// List every place of the scan that looks like the part, not the best one alone
+    /// List every match, not only the best
     #[arg(long)]
     all: bool,
 }
@@ -94,7 +93,8 @@ pub(super) fn summary(r: &Report) -> String {
     s += &seen(r);
     if let Some(z) = &r.sizes {
         s += &format!(
-            "sizes        along the stripe {:+.3} %, from shot to shot {:+.3} %, difference {:+.3} %, shear {:+.4} degrees against the \
+            "sizes        along the stripe {:+.3} %, from shot to shot {:+.3} %, difference {:+.3} %, shear {:+.4} \
+             degrees against the \
              drawing; {:.3} {:.3} {:.3} {:.4} are expected\n",
             z.along_percent,
             z.across_percent,
@@ -196,7 +196,8 @@ fn row(v: &[f64; 3], digits: usize) -> String {
 pub fn looks(l: &Disagreement) -> String {
     let mut s = String::new();
     s += &format!(
-        "looks        {} of them, turned by {:.0} and tilted by {:.0} degrees; looks {} and {} disagree by {} mm, {} degrees; \
+        "looks        {} of them, turned by {:.0} and tilted by {:.0} degrees; looks {} and {} disagree by {} mm, {} \
+         degrees; \
          {} mm, {} degrees are expected{}\n",
         l.looks,
         l.turn_deg,
@@ -212,7 +213,8 @@ pub fn looks(l: &Disagreement) -> String {
     for e in &l.explained_by {
         let off: Vec<String> = e.off_by.iter().map(|(name, by)| format!("{name} {by:+.3}")).collect();
         s += &format!(
-            "  {:16} would explain {:.0} % of it, were it wrong by {}; wrong by {:.0} of its sigmas it could go unnoticed and move the part by {} mm\n",
+            "  {:16} would explain {:.0} % of it, were it wrong by {}; wrong by {:.0} of its sigmas it could go \
+             unnoticed and move the part by {} mm\n",
             e.name,
             100.0 * e.share,
             off.join(", "),

@@ -1,4 +1,5 @@
-//! In: a part's template and pictures. Out: where the part lies in each of them: JSON, CSV, a picture with the matches drawn in.
+//! In: a part's template and pictures. Out: where the part lies in each of them: JSON, CSV, a picture with the
+//! matches drawn in.
 //! Frame and unit: pixels of each picture (x right, y down, an integer is a pixel's centre); degrees, x towards y.
 
 use crate::cli::terminal::arguments::{numbers, parse};
@@ -12,11 +13,11 @@ use crate::raster::{Channel, Depth, Image, decode_in_part, load_in_part};
 use crate::rig::hash_text;
 use std::path::{Path, PathBuf};
 
-/// Find a part in pictures: every place, to a fraction of a pixel
+/// Find a part in pictures by its edges
 ///
-/// The template is a picture that shows the part, whole or in --template-region, or a file that sheetlight teach PICTURE --region
-/// wrote. The score is the mean cosine between the template's directions and the picture's: a part of which three tenths are hidden
-/// scores about 0.7. Nothing found is an answer, not an error.
+/// The template is a picture that shows the part, whole or in --template-region, or a file that sheetlight teach
+/// PICTURE --region wrote. The score is the mean cosine between the template's directions and the picture's: a part
+/// of which three tenths are hidden scores about 0.7. If nothing is found, the list is empty and the exit code is 0.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight match clip.png table.png --out clips.json
@@ -24,35 +25,37 @@ use std::path::{Path, PathBuf};
       --angles -5..5 --out resistors.json
   sheetlight teach board.png --name resistor --region 210,90,64,40 --out resistor.json
   sheetlight match resistor.json line1.png --all --scales 0.9..1.1 --score 0.7 \\
-      --polygon 100,80,900,80,900,700,100,700 --out found.json")]
+      --polygon 100,80,900,80,900,700,100,700 --out found.json
+Guide: docs/match.md")]
 pub struct Args {
-    /// Picture of the part, or what teach --region wrote (.json)
+    /// Picture of the part, or a template from teach --region (.json)
     template: PathBuf,
     /// Pictures to search: PNG, JPEG, TIFF, BMP, PGM
     #[arg(required = true)]
     pictures: Vec<PathBuf>,
-    /// Where the part lies in the template's picture, px: x,y of the top left pixel, width, height [default: all of it]
+    /// Part in the template's picture, px: x,y of the top left pixel, width, height [default: all]
     #[arg(long, value_name = "X,Y,W,H", value_parser = numbers::<4>)]
     template_region: Option<[f64; 4]>,
-    /// Weakest edge of the template, as a share of its strong ones: low takes texture in, high leaves weak outlines out
+    /// Weakest edge of the template as a share of its strong ones; low includes texture
     #[arg(long, default_value_t = ModelOptions::default().contrast)]
     contrast: f64,
-    /// Only matches whose middle lies in this rectangle, px; the rest of the picture is not searched
-    #[arg(long, value_name = "X,Y,W,H", value_parser = numbers::<4>, allow_hyphen_values = true, conflicts_with = "polygon")]
+    /// Only matches with their middle in this rectangle, px
+    #[arg(long, value_name = "X,Y,W,H", value_parser = numbers::<4>, allow_hyphen_values = true,
+        conflicts_with = "polygon")]
     region: Option<[f64; 4]>,
-    /// The same for a polygon: its corners, px
+    /// Only matches with their middle in this polygon: its corners, px
     #[arg(long, value_name = "X,Y,X,Y,...", value_delimiter = ',', allow_hyphen_values = true)]
     polygon: Vec<f64>,
-    /// Turns against the template, degrees; one value twice: it does not turn [default: all]
+    /// Turns against the template, degrees; equal values: it does not turn [default: all]
     #[arg(long, value_name = "LO..HI", value_parser = range, allow_hyphen_values = true)]
     angles: Option<[f64; 2]>,
     /// Sizes against the template's [default: 1..1]
     #[arg(long, value_name = "LO..HI", value_parser = range)]
     scales: Option<[f64; 2]>,
-    /// Every match, not the best alone
+    /// Every match, not only the best
     #[arg(long, conflicts_with = "most")]
     all: bool,
-    /// At most so many matches a picture
+    /// Largest number of matches per picture
     #[arg(long)]
     most: Option<usize>,
     /// Least score, 0.1 to 1
@@ -61,16 +64,16 @@ pub struct Args {
     /// Largest overlap of two matches, as a share of the smaller one
     #[arg(long, default_value_t = SearchOptions::default().max_overlap)]
     overlap: f64,
-    /// Dark on bright is the same as bright on dark
+    /// Ignore edge polarity
     #[arg(long)]
     ignore_polarity: bool,
-    /// Part of a colour picture to use: red, green, blue or luma
+    /// Channel of a colour picture: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = parse::<Channel>)]
     channel: Channel,
     /// Depth of template and pictures, 8 to 16 bits
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u8).range(8..=16))]
     bits: u8,
-    /// File for the matches (JSON); a table (.csv) and a picture of each searched one (.png) go beside it
+    /// File for the matches (JSON); a table (.csv) and pictures (.png) are written beside it
     #[arg(long)]
     out: Option<PathBuf>,
 }
@@ -184,7 +187,7 @@ fn template(args: &Args) -> Result<Template> {
         if args.template_region.is_some() {
             return Err(Fault::usage("--template-region with a taught part")
                 .cause("a file of sheetlight teach has its region in it")
-                .next("leave --template-region out, or give the picture"));
+                .next("omit --template-region, or give the picture"));
         }
         return Template::parse(&crate::files::read_text(path)?).map_err(|e| e.at(path.display()));
     }
@@ -240,7 +243,8 @@ fn overlays(args: &Args) -> Vec<PathBuf> {
 }
 
 fn said_of(t: &Template) -> serde_json::Value {
-    serde_json::json!({"name": t.name, "picture": t.picture, "picture_sha256": t.picture_sha256, "region_px": t.region_px,
+    serde_json::json!({"name": t.name, "picture": t.picture, "picture_sha256": t.picture_sha256,
+        "region_px": t.region_px,
         "edges": t.model.levels[0].len(), "reference": "the middle of the region"})
 }
 
@@ -304,7 +308,8 @@ fn summary(all: &[Found]) -> String {
         );
         for (k, m) in f.matches.iter().enumerate() {
             s += &format!(
-                "{:4}  {:9.3} {:9.3} px  {:8.3} degrees  scale {:.4}  score {:.3}  sigma {:.3} {:.3} px, {:.3} degrees{}\n",
+                "{:4}  {:9.3} {:9.3} px  {:8.3} degrees  scale {:.4}  score {:.3}  sigma {:.3} {:.3} px, {:.3} \
+                 degrees{}\n",
                 k + 1,
                 m.x_px,
                 m.y_px,

@@ -11,38 +11,39 @@ use crate::find::dxf::{DxfOptions, Unit};
 use crate::find::{TaskOptions, recipe_of};
 use std::path::PathBuf;
 
-/// Make a recipe from a drawing: the part is found without ever having been scanned
+/// Make a recipe from a DXF drawing, without a scan
 ///
-/// Reads LINE, ARC, CIRCLE, ELLIPSE, SPLINE, LWPOLYLINE, POLYLINE and INSERT of an ASCII DXF. The outermost closed edges are
-/// the part's top, what lies in them is a hole, and so on inwards; edges that close no outline are searched, not measured.
-/// Texts, dimensions, hatches and what is hidden or in paper space are passed over and counted, other entities refused. Equal
-/// circles in an array become one shape with a grid.
+/// Reads LINE, ARC, CIRCLE, ELLIPSE, SPLINE, LWPOLYLINE, POLYLINE and INSERT of an ASCII DXF. The outermost closed
+/// edges are the part's top, those inside are holes, and so on inwards. Edges that close no outline are searched, not
+/// measured. Texts, dimensions, hatches and hidden or paper-space entities are skipped and counted, other entities
+/// refused. Equal circles in an array become one shape with a grid.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight model socket.dxf --name socket --out socket.toml
   sheetlight model socket.dxf --name socket --unit inch --layer outline --layer pins \\
-      --origin 0,0 --out socket.toml")]
+      --origin 0,0 --out socket.toml
+Guide: docs/finding-and-inserting.md")]
 pub struct Args {
     /// ASCII DXF, seen from above
     drawing: PathBuf,
-    /// A name for the part
+    /// Name of the part
     #[arg(long)]
     name: String,
-    /// Unit of the drawing, whatever it names itself: mm, inch, cm, m, um, mil or foot [default: the one it names; none is guessed]
+    /// Unit of the drawing: mm, inch, cm, m, um, mil or foot [default: the one it states]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Unit>)]
     unit: Option<Unit>,
-    /// A layer that holds edges of the part, switched off or not; several times [default: all that are shown]
+    /// Layer with edges of the part, also if switched off; may be repeated [default: all visible]
     #[arg(long = "layer")]
     layers: Vec<String>,
-    /// The insertion datum in the drawing, in its unit [default: the middle of the
-    /// largest outline's box]
-    #[arg(long, value_name = "X,Y", value_parser = crate::cli::terminal::arguments::numbers::<2>, allow_hyphen_values = true)]
+    /// Insertion datum in the drawing, in its unit [default: middle of the largest outline's box]
+    #[arg(long, value_name = "X,Y", value_parser = crate::cli::terminal::arguments::numbers::<2>,
+        allow_hyphen_values = true)]
     origin: Option<[f64; 2]>,
-    /// How many turns make the part look nearly alike (2: half a turn)
-    #[arg(long, default_value_t = 1)]
+    /// Number of turns at which the part looks nearly alike (2: half a turn)
+    #[arg(long, value_name = "N", default_value_t = 1)]
     alike_turns: u32,
-    /// Edge of a cell of the map that is searched, mm: about two sampling steps of the scan
-    #[arg(long, default_value_t = 0.5)]
+    /// Cell of the searched map, mm: about two sampling steps of the scan
+    #[arg(long, value_name = "MM", default_value_t = 0.5)]
     cell_mm: f64,
     #[command(flatten)]
     insertion: InsertionArgs,

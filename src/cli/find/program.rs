@@ -1,4 +1,5 @@
-//! In: a found position (the JSON of find --out). Out: approach, insertion and retract as a program in a robot's own language.
+//! In: a found position (the JSON of find --out). Out: approach, insertion and retract as a program in a robot's own
+//! language.
 //! Frame and unit: the tool in the robot's base frame; mm, mm/s.
 
 use crate::cli::terminal::console::Console;
@@ -7,17 +8,18 @@ use crate::geometry::{Base, Rigid, Tool};
 use crate::robot::program::{Insertion, Language, program};
 use std::path::PathBuf;
 
-/// Write a found position as a program for the robot's own controller
+/// Write a found pose as a program for the robot's own controller
 ///
-/// Straight to the approach, down, back up; the gripper opens where the comment says so. The tool that inserts has to be
+/// Straight to the approach, down, back up; a comment marks where the gripper opens. The inserting tool has to be
 /// selected on the controller. Languages: pacscript (Denso), urscript, krl (KUKA), tp (FANUC, .LS), rapid (ABB).
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight program pose.json --to urscript --out insert.script")]
+  sheetlight program pose.json --to urscript --out insert.script
+Guide: docs/finding-and-inserting.md")]
 pub struct Args {
-    /// What sheetlight find wrote with --out
+    /// Report from sheetlight find --out
     pose: PathBuf,
-    /// The robot's language
+    /// Language: pacscript (Denso), urscript, krl (KUKA), tp (FANUC) or rapid (ABB)
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Language>)]
     to: Language,
     /// File of the program
@@ -55,13 +57,13 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     crate::files::not_over(&args.out, [args.pose.as_path()])?;
     let text = crate::files::read_text(&args.pose)?;
     let found: Found = serde_json::from_str(&text).map_err(|e| {
-        Fault::input(format!("{}: holds no position: {e}", args.pose.display()))
+        Fault::input(format!("{}: contains no pose: {e}", args.pose.display()))
             .cause("another file than the one that sheetlight find --out wrote")
             .next("give that file")
     })?;
     let Some(poses) = found.poses else {
         return Err(Fault::refused(format!(
-            "{}: '{}' was refused, there is no pose to go to",
+            "{}: '{}' was refused, so there is no pose",
             args.pose.display(),
             found.recipe
         ))

@@ -1,5 +1,5 @@
-//! In: a finished scan of a part, its recording's poses, a recipe, a station. Out: the robot poses of a second scan of the same
-//! part from another side, and which errors of which calibration the two together can show.
+//! In: a finished scan of a part, its recording's poses, a recipe, a station. Out: the robot poses of a second scan
+//! of the same part from another side, and which errors of which calibration the two together can show.
 //! Frame and unit: base frame; mm, degrees.
 
 use crate::cli::terminal::console::Console;
@@ -12,39 +12,40 @@ use crate::robot::Convention;
 use crate::station::{Settings, second_look};
 use std::path::PathBuf;
 
-/// Plan a second look at a part: where the sensor goes, and what the two looks can show
+/// Plan a verification scan of a part from another side
 ///
-/// What a calibration, a delay, a convention or the robot got wrong moves the part in one look and moves it otherwise in a
-/// look from another side. The second scan is the first one turned about the part's normal and tilted: a turn alone cannot
-/// show an error along the approach. Check every pose for reach and collision before the robot goes there.
+/// An error of calibration, delay, convention or robot moves the part differently in a scan from another side. The
+/// second scan is the first one turned about the part's normal and tilted, because a turn alone cannot show an error
+/// along the approach. Check every pose for reach and collision before the robot goes there.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight second-look scans/b7 --recording recordings/b7 --recipe led.toml --station cell3 \\
       --out second.json
   (scan along the poses in second.json, then)
-  sheetlight find scans/b7 scans/b7again --recipe led.toml --station cell3 --out led.json")]
+  sheetlight find scans/b7 scans/b7again --recipe led.toml --station cell3 --out led.json
+Guide: docs/finding-and-inserting.md")]
 pub struct Args {
-    /// Folder that sheetlight scan --out wrote
+    /// Folder from sheetlight scan --out
     scan: PathBuf,
-    /// The recording of that scan: its poses are turned
+    /// Recording of that scan; its poses are turned
     #[arg(long)]
     recording: PathBuf,
-    /// Pose file of the recording [default: the one that its meta.json names]
+    /// Pose file of the recording [default: the one in meta.json]
     #[arg(long)]
     poses: Option<String>,
     /// Recipe of the part (TOML)
     #[arg(long)]
     recipe: PathBuf,
-    /// Station that scanned
+    /// Station of the scan
     #[arg(long)]
     station: PathBuf,
     /// Turn about the part's normal, degrees, 60 to 300
     #[arg(long, default_value_t = 180.0)]
     turn: f64,
-    /// Tilt about the part's x, degrees, 10 to 45 either way
+    /// Tilt about the part's x, degrees, 10 to 45 to either side
     #[arg(long, default_value_t = 20.0, allow_hyphen_values = true)]
     tilt: f64,
-    /// File for the flange poses, one for each shot of the first scan (JSON, base_T_flange)
+    /// File for the flange poses, one per shot of the first scan (JSON, base_T_flange)
     #[arg(long)]
     out: PathBuf,
 }

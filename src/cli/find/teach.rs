@@ -1,5 +1,6 @@
-//! In: a scan folder and where the part's outline, windows and holes lie in its height map, or a picture and a region of it. Out: a
-//! recipe, proven on that scan, and a picture of the proof; or a template for `match` and a picture of its edges.
+//! In: a scan folder and where the part's outline, windows and holes lie in its height map, or a picture and a region
+//! of it. Out: a recipe, proven on that scan, and a picture of the proof; or a template for `match` and a picture of
+//! its edges.
 //! Frame and unit: height map's grid frame, mm from its corner; pixels of the picture.
 
 use super::matching::taught;
@@ -15,52 +16,54 @@ use crate::raster::Channel;
 use crate::station::teach_part;
 use std::path::{Path, PathBuf};
 
-/// Teach a new part: from one scan and a few numbers to a recipe
+/// Make a recipe from a scan and a few numbers
 ///
-/// The numbers are millimetres in the height map that scan.json and height.png show (from its corner,
-/// x along columns, y along rows), to half a millimetre; the points give the exact dimensions.
+/// The numbers are millimetres in the height map that scan.json and height.png show (from its corner, x along
+/// columns, y along rows). Half a millimetre is close enough; the points give the exact dimensions.
 ///
-/// With --region a picture is taught instead of a scan: what lies in the region becomes a template that sheetlight match finds in
+/// With --region a picture is taught instead of a scan: the region becomes a template that sheetlight match finds in
 /// other pictures.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight teach board.png --name relay --region 210,90,64,40 --out relay.json
   sheetlight teach scans/board7 --name relay --outline 84,20,104.4,32.8 --window 89,24,99.4,28.4 \\
-      --hole 86.5,22.5,0.72 --hole 101.7,30.2,0.72 --out relay.toml")]
+      --hole 86.5,22.5,0.72 --hole 101.7,30.2,0.72 --out relay.toml
+Guide: docs/finding-and-inserting.md")]
 pub struct Args {
-    /// Folder that sheetlight scan --out wrote; with --region a picture
+    /// Folder from sheetlight scan --out; with --region a picture
     scan: PathBuf,
-    /// A name for the part
+    /// Name of the part
     #[arg(long)]
     name: String,
-    /// Where the part lies in the picture, px: x,y of the top left pixel, width, height
+    /// Part in the picture, px: x,y of the top left pixel, width, height
     #[arg(long, value_name = "X,Y,W,H", value_parser = crate::cli::terminal::arguments::numbers::<4>,
         conflicts_with_all = ["outline", "angle_deg", "windows", "holes"])]
     region: Option<[f64; 4]>,
-    /// With --region: weakest edge, as a share of the strong ones
+    /// With --region: weakest edge as a share of the strong ones
     #[arg(long, requires = "region", default_value_t = ModelOptions::default().contrast)]
     contrast: f64,
-    /// With --region: part of a colour picture to use: red, green, blue or luma
-    #[arg(long, requires = "region", default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
+    /// With --region: channel of a colour picture: red, green, blue or luma
+    #[arg(long, requires = "region", default_value = "luma",
+        value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
     /// With --region: depth of the picture, 8 to 16 bits
     #[arg(long, requires = "region", default_value_t = 8, value_parser = clap::value_parser!(u8).range(8..=16))]
     bits: u8,
-    /// Corners of the body before it is turned, mm: x0,y0,x1,y1
+    /// Corners of the unturned body, mm: x0,y0,x1,y1
     #[arg(long, value_parser = crate::cli::terminal::arguments::numbers::<4>, required_unless_present = "region")]
     outline: Option<[f64; 4]>,
-    /// Turn of the body about its centre from x towards y, degrees
-    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    /// Turn of the body about its centre, x towards y, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
     angle_deg: f64,
-    /// Corners of a window in the body, mm, several times: x0,y0,x1,y1
+    /// Corners of a window in the body, mm: x0,y0,x1,y1; may be repeated
     #[arg(long = "window", value_parser = crate::cli::terminal::arguments::numbers::<4>)]
     windows: Vec<[f64; 4]>,
-    /// A round hole, mm, several times: x,y,radius
+    /// Round hole, mm: x,y,radius; may be repeated
     #[arg(long = "hole", value_parser = crate::cli::terminal::arguments::numbers::<3>)]
     holes: Vec<[f64; 3]>,
     #[command(flatten)]
     insertion: InsertionArgs,
-    /// File for the recipe (TOML) or template (JSON); the picture goes beside it with .png
+    /// File for the recipe (TOML) or template (JSON); a picture (.png) is written beside it
     #[arg(long)]
     out: PathBuf,
 }

@@ -10,29 +10,30 @@ use crate::station::{GuideOptions, Settings, Step, guide};
 use std::io::{BufRead, IsTerminal};
 use std::path::PathBuf;
 
-/// Guide an operator through a whole insertion, on recordings or a simulated station
+/// Go through a whole insertion with recordings instead of a robot
 ///
-/// Touch the board with the pointer, look at it squarely, scan, find the part, approach, insert,
-/// retract. Every step says what it measured; where the robot would move, it asks.
+/// Touch the board with the pointer, look at it squarely, scan, find the part, approach, insert, retract. Every step
+/// prints its measurements and asks before the robot would move.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight guide --station cell3 --touch recordings/touch --scan recordings/led \\
-      --recipe data/recipes/led.toml --robot denso --out job17 --yes")]
+      --recipe data/recipes/led.toml --robot denso --out job17 --yes
+Guide: docs/finding-and-inserting.md")]
 pub struct Args {
     /// Station folder with camera, laser plane, pointer and hand-eye calibrated
     #[arg(long)]
     station: PathBuf,
-    /// Recording of the pointer's spot on three or more places of the board
+    /// Recording of the pointer's spot on three or more points of the board
     #[arg(long)]
     touch: PathBuf,
-    /// Pose file of that recording, without extension [default: the one meta.json names]
-    #[arg(long)]
+    /// Pose file of that recording, without extension [default: the one in meta.json]
+    #[arg(long, value_name = "FILE")]
     touch_poses: Option<String>,
     /// Recording of the line over the part
     #[arg(long)]
     scan: PathBuf,
-    /// Pose file of that recording, without extension [default: the one meta.json names]
-    #[arg(long)]
+    /// Pose file of that recording, without extension [default: the one in meta.json]
+    #[arg(long, value_name = "FILE")]
     scan_poses: Option<String>,
     /// Recipe (TOML) of the part
     #[arg(long)]
@@ -40,21 +41,19 @@ pub struct Args {
     /// Folder for the scan, the picture and guide.json
     #[arg(long)]
     out: PathBuf,
-    /// Notation of the poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion, matrix, densot, gba or kawasaki [default:
-    /// the station's robot, else matrix]
+    /// Notation of the poses: denso, ur, kuka, ... (docs/conventions.md) [default: the station's, else matrix]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
     robot: Option<Convention>,
-    /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
+    /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
     #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
-    /// Distance of the camera from the board when it looks at it squarely, mm [default: the middle of the working volume, else
-    /// where the sheet meets the camera's axis]
-    #[arg(long)]
+    /// Distance of the camera from the board in the square view, mm [default: middle of the working volume]
+    #[arg(long, value_name = "MM")]
     view_mm: Option<f64>,
     /// Largest angle between the touched board and the found part, degrees
-    #[arg(long, default_value_t = 3.0)]
+    #[arg(long, value_name = "DEG", default_value_t = 3.0)]
     max_tilt_deg: f64,
-    /// Answer every question with yes: for recordings and simulated stations
+    /// Answer every question with yes; recordings and simulated stations only
     #[arg(long)]
     yes: bool,
 }
@@ -104,7 +103,7 @@ fn described(number: usize, step: &Step) -> String {
 /// A yes from the terminal; anything else is a no. Without a terminal nobody can answer.
 fn ask(question: &str, console: &Console) -> Result<bool> {
     if !std::io::stdin().is_terminal() {
-        return Err(Fault::usage(format!("nobody can answer '{question}': standard input is no terminal"))
+        return Err(Fault::usage(format!("nobody can answer '{question}': standard input is not a terminal"))
             .next("run it in a terminal, or pass --yes for recordings and simulated stations"));
     }
     console.ask(&format!("   {question} [y/N] "));

@@ -1,4 +1,5 @@
-//! In: a station, a robot, a camera, a recipe. Out: the insertion, step by step, each motion shown and confirmed; the job's report.
+//! In: a station, a robot, a camera, a recipe. Out: the insertion, step by step, each motion shown and confirmed; the
+//! job's report.
 //! Frame and unit: base frame; poses in the robot's own notation; mm, s.
 
 use super::moving::Moving;
@@ -10,41 +11,42 @@ use crate::station::Settings;
 use crate::station::job::{Job, JobOptions, JobReport, Outcome, Phase, Resumes};
 use std::path::{Path, PathBuf};
 
-/// Insert a part with a robot: touch, square, scan, find, approach, insert, retract
+/// Insert a part with a linked robot: touch, scan, find, approach, insert, retract
 ///
-/// Jog the arm until the board is in view, the component in the gripper. Every motion is shown with its gates and asked for;
-/// one yes moves once. Without --allow-motion nothing moves. The state is in --out: the same command goes on, or backs out, after
-/// whatever cut it off. Ctrl-C halts the arm.
+/// Jog the arm until the board is in view, with the component in the gripper. Every motion is shown with its gates;
+/// one confirmation allows one motion. Without --allow-motion nothing moves. The state is in --out: after an
+/// interruption the same command continues or backs out. Ctrl-C halts the arm.
 ///
-/// Sheetlight is no safety device: somebody stands at the emergency stop.
+/// Sheetlight is not a safety device: somebody stands at the emergency stop.
 #[derive(clap::Args)]
 #[command(after_help = "Example, with a simulated cell:
   sheetlight cell simulate --part osc --station cell --robot-port 5007 --camera-port 5017
   sheetlight job --station cell --robot bcap://127.0.0.1:5007 --out job1 --allow-motion --yes \\
-      --camera cell://127.0.0.1:5017?rate=-1 --recipe data/recipes/osc.toml")]
+      --camera cell://127.0.0.1:5017?rate=-1 --recipe data/recipes/osc.toml
+Guide: docs/robots.md")]
 pub struct Args {
     #[command(flatten)]
     moving: Moving,
     /// Recipe (TOML) of the part
     #[arg(long)]
     recipe: PathBuf,
-    /// Folder of the job: its state, recordings, scan, report; with --repeat one folder a job in it
+    /// Folder of the job: state, recordings, scan, report; with --repeat one folder per job
     #[arg(long)]
     out: PathBuf,
-    /// The line sweeps over so much about the picture's middle, mm [default: over the part
-    /// and an eighth of the field's short side to both sides, at most over that side]
+    /// Sweep length centred on the picture, mm [default: the part and an eighth of the field's short side at both
+    /// ends]
     #[arg(long)]
     sweep: Option<f64>,
-    /// Notation in which poses are shown [default: the station's robot, else denso]
+    /// Notation in which poses are shown [default: the station's, else denso]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
     notation: Option<Convention>,
-    /// Where the stages run: auto, gpu, or cpu
+    /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
     #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
     /// Largest angle between the touched board and the found part, degrees
-    #[arg(long, default_value_t = 3.0)]
+    #[arg(long, value_name = "DEG", default_value_t = 3.0)]
     max_tilt_deg: f64,
-    /// Jobs one after the other; the first that is stopped ends them
+    /// Number of jobs in a row; the first that is stopped ends them
     #[arg(long, default_value_t = 1)]
     repeat: u32,
 }
@@ -77,7 +79,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         if stopped {
             console.result(&reports, &text(&reports));
             return Err(Fault::refused(format!("the job was stopped: {why}"))
-                .cause("what is named is not as it has to be")
+                .cause("a condition named above is not met")
                 .next(format!("{next}; {how}; {} has the reason", shown(&out))));
         }
     }

@@ -1,5 +1,5 @@
-//! In: what every command that moves a robot is told: station, robot, camera, speed, leave to move. Out: the robot behind its rules,
-//! taken; the person at the terminal, who is asked before each motion.
+//! In: what every command that moves a robot is told: station, robot, camera, speed, leave to move. Out: the robot
+//! behind its rules, taken; the person at the terminal, who is asked before each motion.
 //! Frame and unit: mm/s.
 
 use crate::arm::rules::{Confirmation, Guard};
@@ -15,28 +15,29 @@ use std::path::PathBuf;
 /// A robot with a camera that may be moved.
 #[derive(clap::Args)]
 pub(in crate::cli) struct Moving {
-    /// Station folder; its station.toml states [motion], [outputs] and [tool] (docs/robots.md)
+    /// Station folder; station.toml needs [motion], [outputs] and [tool] (docs/robots.md)
     #[arg(long)]
     pub station: PathBuf,
-    /// The robot: bcap://HOST[:5007][?network=udp][&full=MM_S][&turn=DEG_S]
+    /// The robot: bcap://HOST[:5007][?network=udp][&full=MM_S][&turn=DEG_S] (docs/robots.md)
     #[arg(long)]
     pub robot: String,
     /// The camera (docs/live.md)
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<CameraUri>)]
     pub camera: CameraUri,
-    /// The arm may move
+    /// Allow robot motion
     #[arg(long)]
     pub allow_motion: bool,
-    /// Speed of every motion, mm/s, at most the station's [default: the station's, else 50]
+    /// Speed of every motion, mm/s, up to the station's [default: the station's, else 50]
     #[arg(long)]
     pub speed: Option<f64>,
-    /// Say yes to every motion: for simulated cells alone
+    /// Confirm every motion automatically; simulated cells only
     #[arg(long)]
     pub yes: bool,
 }
 
 impl Moving {
-    /// The robot behind its rules, taken for motions; Ctrl-C halts it, the station's motions.jsonl has what is asked and made.
+    /// The robot behind its rules, taken for motions; Ctrl-C halts it, the station's motions.jsonl has what is asked
+    /// and made.
     ///
     /// # Errors
     /// `--yes` for a robot that does not say that it is a simulated one; no leave to move; no controller.
@@ -45,7 +46,10 @@ impl Moving {
         // An address on this machine says nothing: a tunnel to a real controller has one too.
         if self.yes && !guard.link().simulated()? {
             return Err(Fault::usage(format!("--yes with the robot {}", self.robot))
-                .cause("its controller does not say that it is a simulated one, and only such a robot moves without a person's yes")
+                .cause(
+                    "its controller does not say that it is a simulated one, and only such a robot moves without \
+                        a person's yes",
+                )
                 .next("leave --yes out"));
         }
         guard.stop_button().listen(interrupt::asked_for());
@@ -72,7 +76,7 @@ impl Person<'_> {
             return Ok(true);
         }
         if !std::io::stdin().is_terminal() {
-            return Err(Fault::usage(format!("nobody can answer '{question}': standard input is no terminal"))
+            return Err(Fault::usage(format!("nobody can answer '{question}': standard input is not a terminal"))
                 .next("run it in a terminal"));
         }
         self.console.ask(&format!("   {question} [y/N] "));

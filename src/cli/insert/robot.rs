@@ -1,4 +1,5 @@
-//! In: a station, a camera, recipes, an address. Out: what a robot's own program asks for over TCP, answered until Ctrl-C.
+//! In: a station, a camera, recipes, an address. Out: what a robot's own program asks for over TCP, answered until
+//! Ctrl-C.
 //! Frame and unit: poses in the robot's own notation.
 
 use crate::capture::CameraUri;
@@ -19,21 +20,22 @@ pub enum Command {
     Output(TryOutput),
 }
 
-/// Try an output of a linked controller: lasers and lamp light for a second and a half, the gripper opens or closes; nothing moves
+/// Test an output of a linked controller: lasers and lamp for 1.5 s, or the gripper
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight robot output line --station cell3 --robot bcap://192.168.0.1:5007 --allow-motion")]
+  sheetlight robot output line --station cell3 --robot bcap://192.168.0.1:5007 --allow-motion
+Guide: docs/robots.md")]
 pub struct TryOutput {
     /// line, pointer, room, open or close
     #[arg(value_parser = crate::cli::terminal::arguments::parse::<Output>)]
     output: Output,
-    /// Station folder; [outputs] of its station.toml says what hangs where
+    /// Station folder; [outputs] of station.toml states the numbers
     #[arg(long)]
     station: PathBuf,
     /// The robot: bcap://HOST[:5007]
     #[arg(long)]
     robot: String,
-    /// The arm may be taken; somebody stands beside the cell
+    /// Allow taking the arm; somebody stands beside the cell
     #[arg(long)]
     allow_motion: bool,
 }
@@ -49,38 +51,40 @@ fn output(args: &TryOutput, console: &Console) -> Result<()> {
     Ok(())
 }
 
-/// Answer a robot's own program over a TCP socket: it scans, asks for a part, gets poses in its notation
+/// Answer a robot's own program over a TCP socket
 ///
-/// For controllers that are not linked: the robot's program moves the arm, switches the line, and says at each stop where its
-/// flange is; sheetlight takes the pictures and answers. One program at a time. docs/robots has the lines and programs for UR,
-/// KUKA, FANUC, ABB and Denso. Nothing here moves a robot.
+/// For controllers that are not linked. The robot's program moves the arm, switches the line, and sends the flange
+/// pose at each stop. Sheetlight takes the pictures and answers with poses in the robot's notation. One program at a
+/// time. docs/robots/README.md has the lines and programs for UR, KUKA, FANUC, ABB and Denso. Sheetlight moves no
+/// robot here.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight robot serve --station cell3 --camera gige://first --recipes data/recipes \\
-      --notation ur --listen 0.0.0.0:5050 --out scans")]
+      --notation ur --listen 0.0.0.0:5050 --out scans
+Guide: docs/robots.md")]
 pub struct Serve {
-    /// Station folder: calibrations; [tool] in station.toml for poses of the flange
+    /// Station folder; station.toml needs [tool] for poses of the flange
     #[arg(long)]
     station: PathBuf,
     /// The camera (docs/live.md)
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<CameraUri>)]
     camera: CameraUri,
-    /// Folder of recipes: FIND led takes led.toml
+    /// Folder of recipes; FIND led uses led.toml
     #[arg(long)]
     recipes: PathBuf,
-    /// Folder of the scans, a folder each
+    /// Folder for the scans
     #[arg(long)]
     out: PathBuf,
-    /// Address and port to listen on; anybody who reaches it may ask
+    /// Address and port to listen on; anybody who reaches it can send requests
     #[arg(long, default_value = "127.0.0.1:5050")]
     listen: String,
-    /// Notation of the poses [default: the station's robot]
+    /// Notation of the poses (docs/conventions.md) [default: the station's]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
     notation: Option<Convention>,
-    /// A program that says nothing for so long is let go, s, 1 to 86400
+    /// Disconnect a program after this silence, s, 1 to 86400
     #[arg(long, default_value_t = 600.0)]
     patience: f64,
-    /// Where the stages run: auto, gpu, or cpu
+    /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
     #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
 }

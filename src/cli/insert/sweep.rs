@@ -1,5 +1,5 @@
-//! In: a station, a recipe, maybe a robot that says where it stands. Out: how the line goes over the part, what is left beside it, and
-//! which speed goes with which step; nothing moves.
+//! In: a station, a recipe, maybe a robot that says where it stands. Out: how the line goes over the part, what is
+//! left beside it, and which speed goes with which step; nothing moves.
 //! Frame and unit: base frame; poses in the robot's own notation; mm, mm/s, pictures a second.
 
 use crate::cli::terminal::console::Console;
@@ -11,16 +11,18 @@ use crate::station::job::{JobState, Preview, PreviewOptions, preview};
 use crate::station::{Settings, load_report};
 use std::path::PathBuf;
 
-/// Show how the line will sweep over a part, before anything moves
+/// Show how a job will sweep the line over a part, before anything moves
 ///
-/// The same sweep that sheetlight job makes: its length, step and shots, how far the part may lie off the picture's middle, what is
-/// left of the working volume and to the box of [motion]. Until a job has touched the board it is taken to lie squarely before the
-/// camera. Below stands the pace of a scan that does not stop for its pictures (sheetlight scan --camera): speed, step and pictures
-/// a second, and whether camera, chain or arm limits them. A job stops at each shot.
+/// The same sweep as in sheetlight job: its length, step and shots, and how far the part may lie off the picture's
+/// middle. It also shows the remaining distance to the limits of the working volume and of [motion]. Until a job has
+/// touched the board, the board is taken to lie squarely before the camera. Below stands the pace of a scan that does
+/// not stop for its pictures (sheetlight scan --camera): speed, step and pictures per second, and whether camera,
+/// chain or arm limits them.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight sweep --station cell3 --recipe data/recipes/led.toml --robot bcap://10.0.0.2
-  sheetlight sweep --station cell3 --recipe led.toml --camera-rate 60 --scan scans/a --step 0.1")]
+  sheetlight sweep --station cell3 --recipe led.toml --camera-rate 60 --scan scans/a --step 0.1
+Guide: docs/robots.md")]
 pub struct Args {
     /// Station folder; its station.toml may state [motion]
     #[arg(long)]
@@ -28,31 +30,31 @@ pub struct Args {
     /// Recipe (TOML) of the part
     #[arg(long)]
     recipe: PathBuf,
-    /// The robot, asked once where it stands: bcap://HOST[:5007], ur://HOST, file:POSES.json
+    /// Robot whose present pose is read: bcap://HOST[:5007], ur://HOST, file:POSES.json
     #[arg(long)]
     robot: Option<String>,
-    /// Folder of a job: the board that it touched
+    /// Folder of a job; its touched board is used
     #[arg(long, conflicts_with = "robot")]
     job: Option<PathBuf>,
-    /// From the camera to the board along its axis, mm [default: where the rig works]
+    /// Distance from the camera to the board along its axis, mm [default: the rig's working distance]
     #[arg(long, conflicts_with = "job")]
     distance: Option<f64>,
-    /// Length of the sweep, mm [default: over the part, as the job's]
+    /// Length of the sweep, mm [default: the job's]
     #[arg(long)]
     sweep: Option<f64>,
-    /// From one shot to the next, mm [default: the job's]
+    /// Step between shots, mm [default: the job's]
     #[arg(long)]
     step: Option<f64>,
-    /// Speed, mm/s [default: the fastest that camera, chain and station bear]
+    /// Speed, mm/s [default: the fastest that camera, chain and station allow]
     #[arg(long)]
     speed: Option<f64>,
-    /// Pictures a second that the camera sends
+    /// Pictures per second of the camera
     #[arg(long, value_name = "HZ")]
     camera_rate: Option<f64>,
-    /// A finished scan of such pictures: so many shots a second did this machine measure
+    /// A finished scan of such pictures; its shots per second are used
     #[arg(long)]
     scan: Option<PathBuf>,
-    /// Notation in which poses are shown [default: the station's robot, else matrix]
+    /// Notation in which poses are shown [default: the station's, else matrix]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
     notation: Option<Convention>,
 }

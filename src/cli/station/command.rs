@@ -19,43 +19,42 @@ use std::path::{Path, PathBuf};
 pub enum Command {
     /// Make a station folder with its station.toml
     New(New),
-    /// Show what a station knows of its rig, and how well
+    /// Show a station's calibrations and their uncertainty
     Show(Show),
-    /// Put known values into a station: a JSON file with any of intrinsics, flange_T_camera,
-    /// laser_plane_camera, pointer_camera (px and mm, docs/file-formats.md)
+    /// Store known calibration values from a JSON file (docs/file-formats.md)
     Import(Import),
-    /// Write a station's values as one JSON file, in the keys that import reads
+    /// Write a station's values as one JSON file that import reads
     Export(Export),
     Set(keep::Set),
     Backup(keep::BackUp),
     Restore(keep::Restore),
     Serve(Box<serve::Serve>),
     Password(serve::Password),
-    /// Vouch for a calibration file that is refused: one of a former version, edited, or of another camera
+    /// Vouch for a refused calibration file (old, edited, of another camera)
     ///
-    /// The file gets a new seal and your reason in it, and every report made with it shows that. What is no calibration at all
-    /// (a direction that is not 1 long, a covariance that is none) is refused even so.
+    /// The file gets a new seal and your reason, and every report made with it shows the reason. A file that does not
+    /// hold a valid calibration (a direction that is not 1 long, an invalid covariance) is refused even so.
     #[command(after_help = "Example:
-  sheetlight station seal --station cell3 --kind laser-plane --because gauge-block-of-may")]
+  sheetlight station seal --station cell3 --kind laser-plane --because gauge-block-of-may
+Guide: docs/file-formats.md")]
     Seal(Seal),
 }
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight station new --station cell3 --robot denso --mount eye-in-hand")]
+  sheetlight station new --station cell3 --robot denso --mount eye-in-hand
+Guide: docs/file-formats.md")]
 pub struct New {
-    /// Folder to make
+    /// New station folder
     #[arg(long)]
     station: PathBuf,
-    /// A name for pages and files [default: the folder's]
+    /// Name on pages and in files [default: the folder's]
     #[arg(long)]
     name: Option<String>,
-    /// How the robot writes poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion, matrix, densot, gba or kawasaki
-    /// [default: none; poses are then read and written as matrices]
+    /// Notation of the robot's poses: denso, ur, kuka, fanuc, abb, ... (docs/conventions.md) [default: matrices]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
     robot: Option<Convention>,
-    /// Where the camera is: eye-in-hand (on the flange) or eye-to-hand (it stands still, and the flange carries the
-    /// part) [default: not stated]
+    /// Where the camera is: eye-in-hand (on the flange) or eye-to-hand (fixed) [default: not stated]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Mount>)]
     mount: Option<Mount>,
 }
@@ -71,32 +70,32 @@ pub struct Show {
 pub struct Import {
     /// JSON file with the values
     values: PathBuf,
-    /// Station folder; made where there is none
+    /// Station folder; created if missing
     #[arg(long)]
     station: PathBuf,
-    /// The values are right although they look like another unit
+    /// Accept values that look like another unit
     #[arg(long)]
     as_stated: bool,
-    /// How far the robot's poses scatter, each axis, mm (1 sigma, as all of these) [default: 0.02, assumed]
-    #[arg(long)]
+    /// Scatter of the robot's positions per axis, mm, 1 sigma as all of these [default: 0.02, assumed]
+    #[arg(long, value_name = "MM")]
     robot_sigma_mm: Option<f64>,
-    /// The same of its turns, degrees [default: 0.004, assumed]
-    #[arg(long)]
+    /// Scatter of the robot's orientations per axis, degrees [default: 0.004, assumed]
+    #[arg(long, value_name = "DEG")]
     robot_sigma_deg: Option<f64>,
-    /// How far the camera's place on the flange (or in the base frame) is off, each axis, mm [default: 0.03, assumed]
-    #[arg(long)]
+    /// Error of the camera's position per axis, mm [default: 0.03, assumed]
+    #[arg(long, value_name = "MM")]
     hand_eye_sigma_mm: Option<f64>,
-    /// The same of its turn, degrees [default: 0.006, assumed]
-    #[arg(long)]
+    /// Error of the camera's orientation per axis, degrees [default: 0.006, assumed]
+    #[arg(long, value_name = "DEG")]
     hand_eye_sigma_deg: Option<f64>,
-    /// How far the laser plane is off where it is used, mm [default: 0.02, assumed]
-    #[arg(long)]
+    /// Error of the laser plane at the working distance, mm [default: 0.02, assumed]
+    #[arg(long, value_name = "MM")]
     plane_sigma_mm: Option<f64>,
-    /// The same of its tilt, degrees [default: 0.006, assumed]
-    #[arg(long)]
+    /// Error of the laser plane's tilt, degrees [default: 0.006, assumed]
+    #[arg(long, value_name = "DEG")]
     plane_sigma_deg: Option<f64>,
-    /// How far focal lengths and principal point are off, px [default: 0.5, assumed]
-    #[arg(long)]
+    /// Error of focal lengths and principal point, px [default: 0.5, assumed]
+    #[arg(long, value_name = "PX")]
     camera_sigma_px: Option<f64>,
 }
 
@@ -119,13 +118,13 @@ pub struct Seal {
     /// Station folder
     #[arg(long)]
     station: PathBuf,
-    /// Which one: camera, laser-plane, pointer, hand-eye, base-camera, linear-axis or turntable
+    /// camera, laser-plane, pointer, hand-eye, base-camera, linear-axis or turntable
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Kind>)]
     kind: Kind,
-    /// Why it is to be believed; kept in the file and shown in every report
+    /// Reason to trust the file; stored in it and shown in every report
     #[arg(long)]
     because: String,
-    /// The values are right although they look like another unit
+    /// Accept values that look like another unit
     #[arg(long)]
     as_stated: bool,
 }
@@ -197,7 +196,7 @@ fn seal(a: &Seal, console: &Console) -> Result<()> {
         _ => Rig::vouch::<HandEye>,
     };
     if a.because.trim().is_empty() {
-        return Err(Fault::usage("--because says nothing").next("say why the file is to be believed"));
+        return Err(Fault::usage("--because says nothing").next("give the reason to trust the file"));
     }
     let path = vouch(&a.station, a.kind, a.because.trim(), a.as_stated)?;
     console.result(&path, &format!("{}: sealed; reports made with it say so", path.display()));

@@ -1,4 +1,5 @@
-//! In: a station. Out: its settings changed by name, all that was chosen and measured of it in one file, and the way back.
+//! In: a station. Out: its settings changed by name, all that was chosen and measured of it in one file, and the way
+//! back.
 //! Frame and unit: as docs/file-formats.md says of each setting.
 
 use crate::cli::terminal::arguments;
@@ -9,15 +10,16 @@ use crate::fault::Result;
 use crate::station::{Backup, back_up_here, edited};
 use std::path::PathBuf;
 
-/// Change settings of station.toml by their names; comments and all else in it stay
+/// Change settings of station.toml; comments stay
 ///
-/// Names with dots: robot, tolerance_mm, working_volume.near_mm, motion.speed_mm_s, extraction.threshold.minimum. A name with nothing
-/// behind the = takes the setting out. What a station cannot have is refused, and nothing is changed then.
+/// Names with dots: robot, tolerance_mm, working_volume.near_mm, motion.speed_mm_s, extraction.threshold.minimum. A
+/// name with nothing behind the = removes the setting. An invalid setting is refused, and then nothing is changed.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight station set robot=ur tolerance_mm=0.05 motion.speed_mm_s=40 --station cell3")]
+  sheetlight station set robot=ur tolerance_mm=0.05 motion.speed_mm_s=40 --station cell3
+Guide: docs/operator.md")]
 pub struct Set {
-    /// NAME=VALUE, several times
+    /// NAME=VALUE; may be repeated
     #[arg(required = true)]
     settings: Vec<String>,
     /// Station folder
@@ -25,10 +27,11 @@ pub struct Set {
     station: PathBuf,
 }
 
-/// Write settings, calibrations, recipes and boards of a station into one file
+/// Back up settings, calibrations, recipes and boards into one file
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight station backup --station cell3 --out cell3.json")]
+  sheetlight station backup --station cell3 --out cell3.json
+Guide: docs/operator.md")]
 pub struct BackUp {
     /// Station folder
     #[arg(long)]
@@ -38,14 +41,15 @@ pub struct BackUp {
     out: PathBuf,
 }
 
-/// Put a station into the state of a backup; jobs stay, and the present state is backed up into its folder backups
+/// Restore a backup; the present state is backed up first, jobs stay
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight station restore cell3.json --station cell3")]
+  sheetlight station restore cell3.json --station cell3
+Guide: docs/operator.md")]
 pub struct Restore {
-    /// File that sheetlight station backup wrote
+    /// File from sheetlight station backup
     backup: PathBuf,
-    /// Station folder; made where there is none
+    /// Station folder; created if missing
     #[arg(long)]
     station: PathBuf,
 }

@@ -1,4 +1,5 @@
-//! In: a station folder, an address. Out: the operator's screen, served until Ctrl-C; a password's hash for other machines.
+//! In: a station folder, an address. Out: the operator's screen, served until Ctrl-C; a password's hash for other
+//! machines.
 //! Frame and unit: as the screen's procedures.
 
 use crate::cli::terminal::console::Console;
@@ -13,79 +14,80 @@ use std::path::{Path, PathBuf};
 
 /// Serve the operator's screen to a browser
 ///
-/// Prints the address to open: it holds a token of this start, so nobody else on the machine gets in. Scan, surface, part,
-/// position, calibration, replay and health are pages of it; everything it does is a procedure that the command line has too.
-/// Jobs are kept in the station's folder: a restart loses none.
+/// Prints the address to open. It holds a token of this start, so nobody else on the machine gets in. Everything on
+/// the pages is a procedure that the command line has too. Jobs are stored in the station's folder and survive a
+/// restart.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight station serve --station demo-cell --simulate
   sheetlight station serve --station cell3 --recordings recordings
   sheetlight station serve --station cell3 --listen 0.0.0.0 --name cell3.plant \\
-      --password-file pw --tls-cert cert.pem --tls-key key.pem")]
+      --password-file pw --tls-cert cert.pem --tls-key key.pem
+Guide: docs/operator.md")]
 pub struct Serve {
-    /// Station folder; with --simulate the folder in which a simulated station and its recordings are made
+    /// Station folder; with --simulate the folder for a simulated station
     #[arg(long)]
     station: PathBuf,
-    /// Folder below which recordings lie [default: the folder that holds the station]
+    /// Folder of the recordings [default: the folder that holds the station]
     #[arg(long)]
     recordings: Option<PathBuf>,
-    /// Without camera and robot: starts a simulated cell with both, makes a station for it in STATION/station and recordings beside
-    /// it, once
+    /// Start a simulated cell with camera and robot, and make a station for it
     #[arg(long, conflicts_with = "recordings")]
     simulate: bool,
-    /// Part whose component the simulated gripper holds at first: led, osc, flash or dimm
+    /// Component in the simulated gripper: led, osc, flash or dimm
     #[arg(long, default_value = "osc", requires = "simulate")]
     part: String,
-    /// Another specimen of the simulated cell for every seed
+    /// Random seed of the simulated cell
     #[arg(long, default_value_t = 3, requires = "simulate")]
     seed: u64,
-    /// Seconds of the simulated cell in one of ours, 0.1 to 1000
+    /// Simulation speed factor, 0.1 to 1000
     #[arg(long, default_value_t = 1.0, requires = "simulate")]
     speed: f64,
     /// Shots of the simulated scan
     #[arg(long, default_value_t = 200, requires = "simulate")]
     shots: usize,
-    /// Recordings to simulate, separated by commas: scan, surface, intrinsics, handeye, laserplane, pointer_cal, pointer, all, none
+    /// Recordings to simulate, separated by commas: scan, intrinsics, handeye, ..., all, none
     #[arg(long = "set", value_delimiter = ',', default_value = "all", requires = "simulate")]
     sets: Vec<String>,
-    /// The camera, e.g. cell://HOST:PORT, or - with --raw: its newest picture is shown with its peaks (docs/live.md)
+    /// Camera, e.g. gige://first, or - with --raw (docs/live.md)
     #[arg(long, conflicts_with = "simulate")]
     camera: Option<String>,
     /// Raw frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<RawFormat>, requires = "camera")]
     raw: Option<RawFormat>,
-    /// The robot's controller, e.g. bcap://10.0.0.2: its state is shown; it is moved with --allow-motion alone
+    /// Robot, e.g. bcap://10.0.0.2; it moves only with --allow-motion
     #[arg(long, conflicts_with = "simulate")]
     robot: Option<String>,
-    /// The arm may move: jobs may be begun, each motion is shown and confirmed by a held button
+    /// Allow robot motion; each motion is shown first and runs only while a button is held
     #[arg(long)]
     allow_motion: bool,
-    /// Port; the next free one where it is taken, 0 for any [default: 8620, or the next free one]
+    /// Port; 0: any [default: 8620, or the next free one]
     #[arg(long)]
     port: Option<u16>,
-    /// Address to listen on; others than this machine's own need a password and TLS
+    /// Address to listen on; any but 127.0.0.1 needs a password and TLS
     #[arg(long, default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), requires_ifs = [("0.0.0.0", "password_file")])]
     listen: IpAddr,
-    /// File with the password's hash, as sheetlight station password writes it
+    /// File with the password's hash, from sheetlight station password
     #[arg(long, requires_all = ["tls_cert", "tls_key"])]
     password_file: Option<PathBuf>,
-    /// The certificate's chain, PEM
+    /// TLS certificate chain, PEM
     #[arg(long, requires_all = ["password_file", "tls_key"])]
     tls_cert: Option<PathBuf>,
-    /// Its private key, PEM
+    /// TLS private key, PEM
     #[arg(long, requires_all = ["password_file", "tls_cert"])]
     tls_key: Option<PathBuf>,
-    /// Name by which browsers call this machine, several times
+    /// Name by which browsers call this machine; may be repeated
     #[arg(long = "name", requires = "password_file")]
     names: Vec<String>,
 }
 
-/// Hash a password for sheetlight station serve --password-file
+/// Hash a password for station serve --password-file
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight station password --out cell3/screen.password")]
+  sheetlight station password --out cell3/screen.password
+Guide: docs/operator.md")]
 pub struct Password {
-    /// File for the hash; the password is asked for, or read from standard input
+    /// File for the hash; the password is prompted for, or read from standard input
     #[arg(long)]
     out: PathBuf,
 }

@@ -49,13 +49,13 @@ impl Console {
         }
     }
 
-    /// `Err` where stdout took less than all of the data. A reader that has seen enough (`| head`) is no error: what the
-    /// command wrote into files is whole.
+    /// `Err` where stdout took less than all of the data. A reader that has seen enough (`| head`) is no error: what
+    /// the command wrote into files is whole.
     pub fn finish(&self) -> Result<()> {
         match &*self.failed.borrow() {
             Some(e) if e.kind() != ErrorKind::BrokenPipe => Err(Fault::output(format!("standard output: {e}"))
                 .cause("the disk that it is sent to is full, or it was closed")
-                .next("free some space, or send it elsewhere; what the command wrote into files is whole")),
+                .next("free some space, or send it elsewhere; the command's files are complete")),
             _ => Ok(()),
         }
     }

@@ -1,5 +1,5 @@
-//! In: SIGINT, SIGTERM, SIGHUP. Out: a flag that a long command looks at, so that it ends with what it has; a second signal ends
-//! the process at once.
+//! In: SIGINT, SIGTERM, SIGHUP. Out: a flag that a long command looks at, so that it ends with what it has; a second
+//! signal ends the process at once.
 //! Frame and unit: none.
 
 use signal_hook::consts::{SIGINT, SIGTERM};

@@ -1,4 +1,5 @@
-//! In: results, talk, keys pressed. Out: stdout for data, stderr for people, options' values, a scan that ends when asked to.
+//! In: results, talk, keys pressed. Out: stdout for data, stderr for people, options' values, a scan that ends when
+//! asked to.
 //! Frame and unit: none.
 
 pub mod arguments;

@@ -1,4 +1,5 @@
-//! In: where results are to go, and the folders and files that a command reads. Out: a refusal where one would replace another.
+//! In: where results are to go, and the folders and files that a command reads. Out: a refusal where one would
+//! replace another.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
@@ -72,7 +73,7 @@ pub fn check_scan(out: &Path, label: &str) -> Result<()> {
     }
     match load_report(out) {
         Ok(report) if report.recording == label => Ok(()),
-        _ => Err(Fault::usage(format!("{}: holds a scan of something else", out.display()))
+        _ => Err(Fault::usage(format!("{}: contains a scan of another recording", out.display()))
             .cause("the folder of a real scan was given")
             .next("give another --out")),
     }

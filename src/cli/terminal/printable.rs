@@ -15,7 +15,8 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     replaced(text, |c| c.escape_unicode().to_string())
 }
 
-/// The same of JSON, whose strings alone can hold such characters: as JSON writes them, so that the value stays what it is.
+/// The same of JSON, whose strings alone can hold such characters: as JSON writes them, so that the value stays what
+/// it is.
 pub fn printable_json(text: &str) -> Cow<'_, str> {
     replaced(text, |c| format!("\\u{:04x}", u32::from(c)))
 }

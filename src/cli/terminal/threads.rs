@@ -1,12 +1,13 @@
-//! In: this machine's processors and what the process may use of them. Out: the pool of threads that all parallel work runs on.
+//! In: this machine's processors and what the process may use of them. Out: the pool of threads that all parallel
+//! work runs on.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
 use rayon::{ThreadBuilder, ThreadPoolBuilder};
 use std::sync::mpsc::{Sender, channel};
 
-/// More threads than this, and than four a processor, are a slip of the hand: a thread that finds no memory for its signal
-/// stack takes the whole process with it.
+/// More threads than this, and than four a processor, are a slip of the hand: a thread that finds no memory for its
+/// signal stack takes the whole process with it.
 const MOST: usize = 256;
 
 /// Starts as many threads as there are processors, or as many of them as the process gets. rayon's own way is all or a

@@ -1,4 +1,5 @@
-//! In: the entities of a DXF file. Out: its curves as polylines and circles, blocks inserted, in one plane seen from above.
+//! In: the entities of a DXF file. Out: its curves as polylines and circles, blocks inserted, in one plane seen from
+//! above.
 //! Frame and unit: the drawing's own x y z and its own unit; angles in degrees in the file.
 
 use super::entity::{ellipse, heavy, level, light, mirrored, point, size, turn, wide};
@@ -171,7 +172,8 @@ impl Reader<'_> {
         let named = self.wanted.contains(&key(layer));
         let table = self.file.layers.get(&key(layer));
         let (off, frozen) = table.map_or((false, false), |l| (l.off, l.frozen));
-        // What a block holds on other layers is seen even where its insertion's layer is off, but not where that is frozen.
+        // What a block holds on other layers is seen even where its insertion's layer is off, but not where that is
+        // frozen.
         let block = e.kind == "INSERT";
         let why = if ANNOTATION.contains(&e.kind.as_str()) {
             String::new()
@@ -200,7 +202,7 @@ impl Reader<'_> {
         let block = self.file.blocks.get(&key(&name));
         // Flags 4 and 8: the block's content is in another file.
         let Some(block) = block.filter(|b| b.head.whole(70, 0).is_ok_and(|flags| flags & 12 == 0)) else {
-            let what = if block.is_some() { "which is in another file" } else { "which is no block" };
+            let what = if block.is_some() { "which is in another file" } else { "which is not a block" };
             return Err(e.fault(format!("it inserts '{name}', {what}")).next("bind external references"));
         };
         if open.len() >= DEEPEST || !open.insert(key(&name)) {

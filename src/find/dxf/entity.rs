@@ -1,4 +1,5 @@
-//! In: one entity of a DXF file. Out: what its tags say: places, sizes, corners, what lies flat and what is seen from below.
+//! In: one entity of a DXF file. Out: what its tags say: places, sizes, corners, what lies flat and what is seen from
+//! below.
 //! Frame and unit: the entity's own x y z, the drawing's own unit; angles in rad.
 
 use super::flatten::arc;
@@ -13,7 +14,7 @@ pub(super) fn point(e: &Entity) -> Result<[f64; 2]> {
 /// A length that is above 0.
 pub(super) fn size(e: &Entity, code: i32) -> Result<f64> {
     let value = e.needed(code)?;
-    if value > 0.0 { Ok(value) } else { Err(e.fault(format!("group {code} is {value}, wanted above 0"))) }
+    if value > 0.0 { Ok(value) } else { Err(e.fault(format!("group {code} is {value}; allowed: above 0"))) }
 }
 
 /// Edges lie in level planes: what rises has no place in a height map's drawing.

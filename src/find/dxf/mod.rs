@@ -1,5 +1,7 @@
-//! In: an ASCII DXF file (LINE, ARC, CIRCLE, ELLIPSE, SPLINE, LWPOLYLINE, POLYLINE, INSERT). Out: a drawing of the part.
-//! Frame and unit: part frame, x and y as drawn, z towards the viewer; mm, from the unit that the file or the user states.
+//! In: an ASCII DXF file (LINE, ARC, CIRCLE, ELLIPSE, SPLINE, LWPOLYLINE, POLYLINE, INSERT). Out: a drawing of the
+//! part.
+//! Frame and unit: part frame, x and y as drawn, z towards the viewer; mm, from the unit that the file or the user
+//! states.
 
 use super::dxf::flatten::FLAT;
 use super::model::drawing::Drawing;
@@ -79,7 +81,7 @@ pub fn read(bytes: &[u8], options: &DxfOptions) -> Result<Imported> {
     let file = tags::read(bytes)?;
     let (unit, doubt) = unit(&file, options.unit)?;
     let read = curves::curves(&file, &options.layers, FLAT / unit.mm)?;
-    let mut notes: Vec<String> = read.passed_over.iter().map(|(what, n)| format!("passed over: {n} {what}")).collect();
+    let mut notes: Vec<String> = read.passed_over.iter().map(|(what, n)| format!("skipped: {n} {what}")).collect();
     let scaled: Vec<Curve> = read.curves.iter().map(|c| moved(c, [0.0; 2], unit.mm)).collect();
     let largest = loops::join(&scaled).loops.into_iter().max_by(|a, b| {
         let size = |l: &loops::Loop| area(&l.points).abs();
@@ -141,7 +143,7 @@ fn unit(file: &tags::File, wanted: Option<Unit>) -> Result<(Unit, Option<String>
         }
         (Some((_, Some(unit))), None) => Ok((unit, contradicted(unit, file.measurement))),
         (Some((code, None)), None) => {
-            Err(Fault::input(format!("its unit is $INSUNITS {code}, which is none of {}", names.join(", ")))
+            Err(Fault::input(format!("its unit is $INSUNITS {code}; known are {}", names.join(", ")))
                 .cause("a drawing of something other than a part, or a wrong header")
                 .next("scale the drawing to millimetres, or state its unit with --unit"))
         }

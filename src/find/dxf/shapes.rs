@@ -1,5 +1,5 @@
-//! In: closed loops and open chains of a drawing. Out: shapes: outlines are material, what lies in them is a hole, and so on
-//! inwards. Frame and unit: part frame; mm.
+//! In: closed loops and open chains of a drawing. Out: shapes: outlines are material, what lies in them is a hole,
+//! and so on inwards. Frame and unit: part frame; mm.
 
 use super::curves::{Curve, Form as Drawn};
 use super::loops::Loop;

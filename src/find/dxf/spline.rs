@@ -1,4 +1,5 @@
-//! In: a SPLINE entity: degree, knots, control points, weights. Out: points on it, within a given distance of the curve.
+//! In: a SPLINE entity: degree, knots, control points, weights. Out: points on it, within a given distance of the
+//! curve.
 //! Frame and unit: the drawing's own x y and unit.
 
 use super::tags::{Entity, Tag};
@@ -18,7 +19,8 @@ const HIGHEST_DEGREE: i64 = 25;
 const MOST_PIECES: usize = 1024;
 
 impl Spline {
-    /// `None` where the file gives only points that the curve passes: how it runs between them is the program's own affair.
+    /// `None` where the file gives only points that the curve passes: how it runs between them is the program's own
+    /// affair.
     pub fn of(e: &Entity) -> Result<Option<Spline>> {
         let all = |code: i32| e.tags.iter().filter(|t| t.code == code).map(Tag::number).collect::<Result<Vec<f64>>>();
         let (knots, weights, x, y) = (all(40)?, all(41)?, all(10)?, all(20)?);
@@ -27,12 +29,12 @@ impl Spline {
         }
         let degree = e.whole(71, 3)?;
         if !(1..=HIGHEST_DEGREE).contains(&degree) {
-            return Err(e.fault(format!("its degree is {degree}, wanted 1 to {HIGHEST_DEGREE}")));
+            return Err(e.fault(format!("its degree is {degree}; allowed: 1 to {HIGHEST_DEGREE}")));
         }
         let (n, degree) = (x.len(), degree as usize);
         if n <= degree || y.len() != n || knots.len() != n + degree + 1 {
             let what = format!(
-                "degree {degree} with {n} control points and {} knots, wanted above {degree} points and {} knots",
+                "degree {degree} with {n} control points and {} knots; allowed: above {degree} points and {} knots",
                 knots.len(),
                 n + degree + 1
             );

@@ -1,4 +1,5 @@
-//! In: the bytes of a DXF file (ASCII). Out: its unit, layers that are off, blocks and entities, each as its group codes.
+//! In: the bytes of a DXF file (ASCII). Out: its unit, layers that are off, blocks and entities, each as its group
+//! codes.
 //! Frame and unit: none; values are text as they stand in the file, lines are counted from 1.
 
 use crate::fault::{Fault, Result};
@@ -94,7 +95,7 @@ impl Tag {
     pub fn number(&self) -> Result<f64> {
         let value = self.value.trim().parse::<f64>().ok().filter(|v| v.is_finite() && v.abs() < 1e12);
         value.ok_or_else(|| {
-            Fault::input(format!("line {}: '{}' is no usable number (finite, below 1e12)", self.line, self.short()))
+            Fault::input(format!("line {}: '{}' is not a usable number (finite, below 1e12)", self.line, self.short()))
                 .cause(DAMAGED)
                 .next(EXPORT)
         })
@@ -103,7 +104,7 @@ impl Tag {
     pub fn whole(&self) -> Result<i64> {
         let value = self.value.trim().parse();
         value.map_err(|_| {
-            Fault::input(format!("line {}: '{}' is no whole number", self.line, self.short()))
+            Fault::input(format!("line {}: '{}' is not a whole number", self.line, self.short()))
                 .cause(DAMAGED)
                 .next(EXPORT)
         })
@@ -146,12 +147,13 @@ pub fn read(bytes: &[u8]) -> Result<File> {
 fn cut(tags: &[Tag]) -> Fault {
     let line = tags.last().map_or(0, |t| t.line);
     Fault::input(format!("ends at line {line} without ENDSEC and EOF"))
-        .cause("the file was cut off, or is no DXF")
+        .cause("the file was cut off, or is not a DXF")
         .next("export the drawing again as ASCII DXF")
 }
 
-/// UTF-8 since 2007, before that the code page of the writer's Windows. Only names are text here: that they differ where
-/// the file's bytes differ is enough, so each byte is taken for a character, which for the western code page is the right one.
+/// UTF-8 since 2007, before that the code page of the writer's Windows. Only names are text here: that they differ
+/// where the file's bytes differ is enough, so each byte is taken for a character, which for the western code page is
+/// the right one.
 fn text(bytes: &[u8]) -> String {
     let plain = match std::str::from_utf8(bytes) {
         Ok(text) => text.to_owned(),
@@ -181,8 +183,8 @@ fn tags(text: &str) -> Result<Vec<Tag>> {
         }
         let Ok(number) = code.trim().parse() else {
             let short: String = code.chars().take(40).collect();
-            return Err(Fault::input(format!("line {}: '{short}' is no group code", i + 1))
-                .cause("the file is no DXF, or is damaged")
+            return Err(Fault::input(format!("line {}: '{short}' is not a group code", i + 1))
+                .cause("the file is not a DXF, or is damaged")
                 .next("export the drawing again as ASCII DXF"));
         };
         let Some((_, value)) = lines.next() else { break };

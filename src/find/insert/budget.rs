@@ -30,8 +30,8 @@ pub struct Term {
 /// The budget and its sum over the terms that are known.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Budget {
-    /// One a source; "peak noise" is contained in "match" and not added again, nor are calibrations by themselves where there is a
-    /// line of them together.
+    /// One a source; "peak noise" is contained in "match" and not added again, nor are calibrations by themselves
+    /// where there is a line of them together.
     pub terms: Vec<Term>,
     /// One standard deviation along x, y, z of the part, mm.
     pub sigma_mm: [f64; 3],

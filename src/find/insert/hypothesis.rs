@@ -1,5 +1,5 @@
-//! In: the search's matches and their rivals, a scan's points, a recipe. Out: the pose that the points agree with, measured, and
-//! its lead over the best pose that they leave possible.
+//! In: the search's matches and their rivals, a scan's points, a recipe. Out: the pose that the points agree with,
+//! measured, and its lead over the best pose that they leave possible.
 //! Frame and unit: base frame, mm; poses of matches in px of the map.
 
 use super::recipe::Recipe;
@@ -104,8 +104,8 @@ fn lift(pose: &Pose, map: &HeightMap, points: &Ordered, recipe: &Recipe) -> Rigi
     base_from_part * Rigid::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.0, (best as f64 + 0.5) * bin))
 }
 
-/// Lead of what was measured over the best rival, 1 - second / first. A score that the points contradict counts for less: a map's
-/// edges fit as well where a part is shifted by the length of its shadow, but no point lies in a shadow.
+/// Lead of what was measured over the best rival, 1 - second / first. A score that the points contradict counts for
+/// less: a map's edges fit as well where a part is shifted by the length of its shadow, but no point lies in a shadow.
 pub(super) fn lead(
     points: &Ordered,
     map: &HeightMap,
@@ -125,8 +125,8 @@ pub(super) fn lead(
     1.0 - rivals.map(weighed).fold(0.0, f64::max) / found.score.max(1e-9)
 }
 
-/// What the points say of a rival, 0 to 1; 0 where it cannot be measured or ends at the pose that was taken or at one of its
-/// alike turns.
+/// What the points say of a rival, 0 to 1; 0 where it cannot be measured or ends at the pose that was taken or at one
+/// of its alike turns.
 fn agreement_at(rival: &Pose, points: &Ordered, map: &HeightMap, recipe: &Recipe, taken: &Rigid<Base, Part>) -> f64 {
     let drawing = recipe.drawing();
     let Ok(measured) = measure(points, &drawing, lift(rival, map, points, recipe), &recipe.measure) else { return 0.0 };
@@ -146,8 +146,8 @@ fn alike_turns(recipe: &Recipe) -> impl Iterator<Item = f64> {
 /// Turns nearer than this are one, rad.
 const SAME_TURN: f64 = 3.0 / 180.0 * std::f64::consts::PI;
 
-/// True for a pose at one of the part's alike turns or, of a long part, shifted along itself: the points tell those apart by
-/// themselves.
+/// True for a pose at one of the part's alike turns or, of a long part, shifted along itself: the points tell those
+/// apart by themselves.
 fn alike(pose: &Pose, found: &Pose, recipe: &Recipe) -> bool {
     let long = long_axis(&recipe.drawing());
     alike_turns(recipe).any(|turn| {

@@ -37,8 +37,8 @@ pub struct LocateOptions {
     pub robot: Convention,
     /// A GPU for the coarse search; the result is the same without.
     pub accelerator: Option<Accelerator>,
-    /// Where another look found the part: tried before what the search finds. From the side a part hides some of its own
-    /// edges, and the best match may lie beside it.
+    /// Where another look found the part: tried before what the search finds. From the side a part hides some of its
+    /// own edges, and the best match may lie beside it.
     pub expected: Option<Rigid<Base, Part>>,
     /// List every place that looks like the part.
     pub all: bool,
@@ -95,8 +95,8 @@ fn search(map: &HeightMap, recipe: &Recipe, options: &LocateOptions) -> Result<V
             "'{}' was not found: nothing scores {:.2} or more",
             recipe.name, search.min_score
         ))
-        .cause("the part is not there, is another one, is hidden, or lies outside the scan")
-        .next("look at the height map of the scan; scan the part again, or teach it anew"));
+        .cause("the part is missing, different, hidden, or outside the scan")
+        .next("look at the height map of the scan; scan the part again, or teach it again"));
     }
     Ok(matches)
 }
@@ -161,8 +161,9 @@ fn examine(
     Ok(Examined { found, measured, agreement, turns, constructions, notes })
 }
 
-/// The part as measured or turned, as the points say where the two differ. Where too few of them tell, they may at the turned pose, unless
-/// somebody expects the one that was measured: a score's last digit has chosen between the two, and neither is quite in place.
+/// The part as measured or turned, as the points say where the two differ. Where too few of them tell, they may at
+/// the turned pose, unless somebody expects the one that was measured: a score's last digit has chosen between the
+/// two, and neither is quite in place.
 fn right_way_round(
     points: &Ordered,
     recipe: &Recipe,
@@ -297,14 +298,16 @@ fn moved_by(b: &Built) -> Rigid<Part, Part> {
     )
 }
 
-/// The part's sizes against what the calibrations make expect; they are the robot's and the camera's as much as the part's.
+/// The part's sizes against what the calibrations make expect; they are the robot's and the camera's as much as the
+/// part's.
 fn size_check(budget: &Budget, recipe: &Recipe) -> Option<SizeCheck> {
     let (shape, seen) = (budget.shape.as_ref()?, budget.seen.as_ref()?);
     Some(SizeCheck::new(shape, &budget.levers, &seen.scan_axes(), recipe.measure.size_sigma))
 }
 
 /// What is said of a pose that rests on one look.
-const ONE_LOOK: &str = "not cross-checked: one look cannot show what calibrations, delay, convention or robot got wrong; \
+const ONE_LOOK: &str = "not cross-checked: one look cannot show what calibrations, delay, convention or robot got \
+                        wrong; \
     plan a second one with sheetlight second-look";
 
 /// What is said of a part that cannot tell pictures from their mirror images.
@@ -337,8 +340,8 @@ fn within_tolerance(recipe: &Recipe, sigma_mm: [f64; 3], sigma_deg: [f64; 3]) ->
     3.0 * sigma_mm[0].max(sigma_mm[1]) <= recipe.insertion.tolerance_mm && 3.0 * turn <= recipe.insertion.tolerance_deg
 }
 
-/// One report from several looks at the same part: the agreed pose, what the looks disagree about, and the gates on it. Every
-/// look must have met its own gates. Errors: none of the looks, or a covariance that cannot be inverted.
+/// One report from several looks at the same part: the agreed pose, what the looks disagree about, and the gates on
+/// it. Every look must have met its own gates. Errors: none of the looks, or a covariance that cannot be inverted.
 pub fn agree(reports: Vec<Report>, witness: Option<&Witness>, recipe: &Recipe, robot: Convention) -> Result<Report> {
     let looks: Vec<Look> =
         reports.iter().map(|r| Look { base_from_part: r.base_from_constructed, budget: &r.budget }).collect();
@@ -407,8 +410,8 @@ mod tests {
     use crate::scan::Along;
     use std::path::Path;
 
-    /// The clock oscillator's socket by its recipe, 3 mm above a table, with as few points where its two turns differ: in the corner that is
-    /// cut, and in the one across from it.
+    /// The clock oscillator's socket by its recipe, 3 mm above a table, with as few points where its two turns
+    /// differ: in the corner that is cut, and in the one across from it.
     fn socket(recipe: &Recipe, told_by: usize) -> Ordered {
         let drawing = recipe.drawing();
         let top = &drawing.faces()[0];
@@ -441,7 +444,8 @@ mod tests {
         let votes = |m: &Measured| vote(&points, &drawing, &m.base_from_part, recipe.alike_turns, &recipe.measure)[0];
         assert_eq!(votes(&right).told(), Some(true), "{:?}", votes(&right));
         // The wrong way round and pulled aside, farther and farther: first the points say so, then
-        // they lie beside its edges; from half a millimetre on they seem to say the reverse, but no measurement ends there.
+        // they lie beside its edges; from half a millimetre on they seem to say the reverse, but no measurement ends
+        // there.
         let half: Rigid<Part, Part> = Rigid::from_vectors(&(Vec3::z() * std::f64::consts::PI), Vec3::zeros());
         let mut left_open = 0;
         for step in 0..100 {

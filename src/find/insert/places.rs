@@ -1,4 +1,5 @@
-//! In: matches in a height map. Out: where each of them lies in the scan's frame, for a list of all places that look like the part.
+//! In: matches in a height map. Out: where each of them lies in the scan's frame, for a list of all places that look
+//! like the part.
 //! Frame and unit: the scan's frame, mm; degrees from x towards y of the map's grid.
 
 use crate::find::search::full::Match;
@@ -10,7 +11,8 @@ use crate::scan::HeightMap;
 pub struct Place {
     /// As of a [`Match`].
     pub score: f64,
-    /// The part's origin on the map's surface, in the scan's frame, mm; at the grid's own height where nothing was measured there.
+    /// The part's origin on the map's surface, in the scan's frame, mm; at the grid's own height where nothing was
+    /// measured there.
     pub at_mm: [f64; 3],
     /// Turn in the map, x towards y, degrees.
     pub angle_deg: f64,

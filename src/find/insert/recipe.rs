@@ -153,13 +153,13 @@ pub struct Gates {
     pub second_look: bool,
     /// Largest disagreement of two looks over what all covariances make expect, 1 to 10.
     pub max_look_ratio: f64,
-    /// Least turn about the part's normal and least tilt against it from one look to the other, degrees, 0 to 180 and 0 to 60:
-    /// looks from one side make the same error twice.
+    /// Least turn about the part's normal and least tilt against it from one look to the other, degrees, 0 to 180 and
+    /// 0 to 60: looks from one side make the same error twice.
     pub min_look_turn_deg: f64,
     /// Least tilt against the part's normal from one look to the other, degrees, 0 to 60.
     pub min_look_tilt_deg: f64,
-    /// Largest error along the part's normal that several looks may leave unseen, mm, 0.00001 to 100; in the plane and as a turn
-    /// the insertion's tolerances hold.
+    /// Largest error along the part's normal that several looks may leave unseen, mm, 0.00001 to 100; in the plane
+    /// and as a turn the insertion's tolerances hold.
     pub max_unseen_height_mm: f64,
 }
 
@@ -275,7 +275,7 @@ fn range(name: &str, v: f64, a: f64, b: f64) -> Result<()> {
     if (a..=b).contains(&v) {
         Ok(())
     } else {
-        Err(Fault::input(format!("{name} is {v}, wanted {a} to {b}")).next("correct the recipe"))
+        Err(Fault::input(format!("{name} is {v}; allowed: {a} to {b}")).next("correct the recipe"))
     }
 }
 
@@ -290,9 +290,10 @@ fn above(name: &str, mm: f64, least: f64) -> Result<()> {
     if (least..=MOST_ABOVE_MM).contains(&mm) {
         return Ok(());
     }
-    Err(Fault::input(format!("insertion.{name} is {mm}, wanted {least:.3} to {MOST_ABOVE_MM}"))
+    Err(Fault::input(format!("insertion.{name} is {mm}; allowed: {least:.3} to {MOST_ABOVE_MM}"))
         .cause(format!(
-            "below {least:.3} mm, the drawn depth of the part and {CLEAR_MM} mm, the tool there is not clear of the part"
+            "below {least:.3} mm, the drawn depth of the part and {CLEAR_MM} mm, the tool there is not clear of the \
+             part"
         ))
         .next(format!("set {name} in the recipe to more than the component reaches into the part, 30 for example")))
 }
@@ -324,7 +325,7 @@ impl InsertionSpec {
         let named = [Some(&self.construction).filter(|n| *n != "pose"), self.two_pin.as_ref(), self.lattice.as_ref()];
         for name in named.into_iter().flatten() {
             if !constructions.iter().any(|c| c.name == *name) {
-                return Err(Fault::input(format!("the insertion refers to '{name}', which is no construction"))
+                return Err(Fault::input(format!("the insertion refers to '{name}', which is not a construction"))
                     .cause("a misspelt name")
                     .next("add it under [[construction]]"));
             }

@@ -90,7 +90,8 @@ pub struct Report {
     pub growth_mm: [f64; 2],
     /// What else a reader must know, one sentence each.
     pub notes: Vec<String>,
-    /// What the part's own sizes say of scale, steps and shear; `None` where too few edges were seen or no station is known.
+    /// What the part's own sizes say of scale, steps and shear; `None` where too few edges were seen or no station is
+    /// known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sizes: Option<SizeCheck>,
     /// What further looks at the part said; `None`: one look alone, not cross-checked.

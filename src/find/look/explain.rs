@@ -1,6 +1,7 @@
-//! In: the stack of looks, and the contrasts that gates judge. Out: for each calibration, and for what none holds (delay, steps),
-//! how much of the disagreement it would explain, how wrong it would be then, and what it could hide.
-//! Frame and unit: the part's axes, mm, degrees; shares; the parameters' own units. docs/math.md, Second look (5) and (6).
+//! In: the stack of looks, and the contrasts that gates judge. Out: for each calibration, and for what none holds
+//! (delay, steps), how much of the disagreement it would explain, how wrong it would be then, and what it could hide.
+//! Frame and unit: the part's axes, mm, degrees; shares; the parameters' own units. docs/math.md, Second look (5) and
+//! (6).
 
 use super::stack::{Gauges, Shared, Stack, singular};
 use crate::fault::Result;
@@ -17,8 +18,9 @@ pub struct Explanation {
     pub off_by: Vec<(&'static str, f64)>,
     /// The same in its own sigmas (root mean square over its numbers); for what nobody states, in usual sizes of it.
     pub off_by_sigmas: f64,
-    /// Largest error of the agreed pose, along the part's axes, that an error along one axis of its covariance alone can make
-    /// and be noticed by a gate in 95 of 100 cases only; and that error, in its own sigmas, where it moves the part most.
+    /// Largest error of the agreed pose, along the part's axes, that an error along one axis of its covariance alone
+    /// can make and be noticed by a gate in 95 of 100 cases only; and that error, in its own sigmas, where it moves
+    /// the part most.
     pub unseen_mm: [f64; 3],
     /// The same of the turns about the part's axes, degrees.
     pub unseen_deg: [f64; 3],
@@ -31,7 +33,8 @@ const FREE: f64 = 1e3;
 /// How far beyond a gate's ratio an error lies that meets it in 95 of 100 cases, standard deviations.
 const NEARLY_ALWAYS: f64 = 1.645;
 
-/// What each of the stack's shared errors explains of the contrasts, best first, and hides from gauges that pass up to `ratio`.
+/// What each of the stack's shared errors explains of the contrasts, best first, and hides from gauges that pass up
+/// to `ratio`.
 pub(in crate::find) fn explanations(
     stack: &Stack,
     gauges: &Gauges,
@@ -75,7 +78,8 @@ struct Unseen {
     sigmas: f64,
 }
 
-/// The largest motions, axis by axis of the part, by errors along single axes that no gauge shows at `noticed` standard deviations.
+/// The largest motions, axis by axis of the part, by errors along single axes that no gauge shows at `noticed`
+/// standard deviations.
 fn unseen(
     lever: &DMatrix<f64>,
     gauges: &Gauges,

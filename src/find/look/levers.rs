@@ -1,5 +1,6 @@
-//! In: places that a rig saw, shot by shot, and how a measurement answers where they move. Out: for each calibration, and for
-//! what no calibration holds (delay, length of the robot's steps), what an error of each of its numbers does to the measurement.
+//! In: places that a rig saw, shot by shot, and how a measurement answers where they move. Out: for each calibration,
+//! and for what no calibration holds (delay, length of the robot's steps), what an error of each of its numbers does
+//! to the measurement.
 //! Frame and unit: base frame, mm, rad; sizes as shares, the part's axes. docs/math.md, Second look.
 
 use crate::camera::{Intrinsics, NAMES, Parameters, difference_step};
@@ -11,8 +12,8 @@ use nalgebra::{DMatrix, Matrix6, SVector};
 /// Numbers of an [`Answer`].
 pub const NUMBERS: usize = 9;
 
-/// What a measurement makes of displacements: shift and turn of the part, then its sizes along x and y and its shear. Where a
-/// measurement knows no sizes they are 0.
+/// What a measurement makes of displacements: shift and turn of the part, then its sizes along x and y and its shear.
+/// Where a measurement knows no sizes they are 0.
 pub type Answer = SVector<f64, NUMBERS>;
 
 /// Names of the levers of what carries the sensor or the part.
@@ -46,8 +47,8 @@ pub struct Lever {
     pub jacobian: DMatrix<f64>,
     /// Of the parameters; `None` where the calibration does not know it (imported values).
     pub covariance: Option<DMatrix<f64>>,
-    /// True for what nothing was stated of: it does not enter sigmas, and may explain what looks disagree about. The covariance
-    /// is then a usual size of it.
+    /// True for what nothing was stated of: it does not enter sigmas, and may explain what looks disagree about. The
+    /// covariance is then a usual size of it.
     pub supposed: bool,
 }
 

@@ -1,4 +1,5 @@
-//! In: the same part found from several sides, each look with its own uncertainty and the levers of what all looks share.
+//! In: the same part found from several sides, each look with its own uncertainty and the levers of what all looks
+//! share.
 //! Out: one pose from all, what the looks disagree about beside what they may, and which calibration would explain it.
 //! Frame and unit: base frame; differences along the part's axes, mm and degrees. docs/math.md, Second look.
 
@@ -30,10 +31,11 @@ pub struct Disagreement {
     pub expected_deg: [f64; 3],
     /// The largest of the six differences over its expected value.
     pub ratio: f64,
-    /// All that should be zero together (differences, sizes, distances), as the standard deviations of one normal variate.
+    /// All that should be zero together (differences, sizes, distances), as the standard deviations of one normal
+    /// variate.
     pub misfit_sigmas: f64,
-    /// Largest turn about the part's normal and largest tilt against it between two looks, degrees; 0 where the stations are
-    /// not known.
+    /// Largest turn about the part's normal and largest tilt against it between two looks, degrees; 0 where the
+    /// stations are not known.
     pub turn_deg: f64,
     /// Largest tilt against the part's normal between two looks, degrees.
     pub tilt_deg: f64,
@@ -45,8 +47,8 @@ pub struct Disagreement {
     pub unseen_height_mm: f64,
     /// The largest turn about any of the part's axes, degrees.
     pub unseen_deg: f64,
-    /// A calibration without covariance takes part: more disagreement than expected may be its share, and what it could hide
-    /// is not known.
+    /// A calibration without covariance takes part: more disagreement than expected may be its share, and what it
+    /// could hide is not known.
     pub complete: bool,
     /// What a witness of the height says.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -99,13 +101,13 @@ impl Disagreement {
     }
 }
 
-/// Brings two or more looks together. The pose is the one of least variance under the joint covariance, in which what the
-/// calibrations got wrong is one error seen from several sides (generalised least squares; docs/math.md, Second look).
-/// `size_sigma`: of the part's own sizes; `ratio`: up to which disagreement passes. Errors: fewer than two looks, or covariances
-/// that cannot be inverted.
+/// Brings two or more looks together. The pose is the one of least variance under the joint covariance, in which what
+/// the calibrations got wrong is one error seen from several sides (generalised least squares; docs/math.md, Second
+/// look). `size_sigma`: of the part's own sizes; `ratio`: up to which disagreement passes. Errors: fewer than two
+/// looks, or covariances that cannot be inverted.
 pub fn agree(looks: &[Look], witness: Option<&Witness>, size_sigma: f64, ratio: f64) -> Result<Agreed> {
     if looks.is_empty() || (looks.len() < 2 && witness.is_none()) {
-        return Err(Fault::usage(format!("{} look given, two or more can be compared", looks.len()))
+        return Err(Fault::usage(format!("{} scan given, two or more can be compared", looks.len()))
             .next("name the second scan's folder behind the first"));
     }
     let stack = Stack::new(looks, witness, size_sigma);
@@ -172,8 +174,8 @@ fn worst_pair(looks: &[Look], stack: &Stack, into_part: &Matrix6<f64>) -> Pair {
     worst.unwrap_or(none)
 }
 
-/// chi² of all that should be zero, as a normal variate of the same probability [wilson31]; below 0 where it agrees better than
-/// the mean.
+/// chi² of all that should be zero, as a normal variate of the same probability [wilson31]; below 0 where it agrees
+/// better than the mean.
 fn misfit(stack: &Stack) -> Result<f64> {
     let rows = stack.contrasts();
     let (d, c) = (&rows * &stack.values, &rows * &stack.covariance * rows.transpose());

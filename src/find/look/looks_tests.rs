@@ -1,5 +1,5 @@
-//! In: a rig's levers on a part seen from several sides, errors drawn or made. Out: judgement on the agreed pose, its sigma, the
-//! gate and what is said of hidden errors.
+//! In: a rig's levers on a part seen from several sides, errors drawn or made. Out: judgement on the agreed pose, its
+//! sigma, the gate and what is said of hidden errors.
 //! Frame and unit: base frame; mm, rad.
 
 use super::*;
@@ -170,7 +170,8 @@ fn a_turn_and_a_tilt_show_an_error_that_looks_from_one_side_hide() {
     assert!(agreed(&turned, &found(&turned, &wrong, &mut rng)).disagreement.ratio > 3.0);
 }
 
-/// Two looks cannot show a hand-eye's error along the axis of the turn between them; a third one about another axis can.
+/// Two looks cannot show a hand-eye's error along the axis of the turn between them; a third one about another axis
+/// can.
 #[test]
 fn a_third_look_shows_what_two_leave_open() {
     let mut rng = rand_pcg::Pcg64::seed_from_u64(9);
@@ -191,8 +192,9 @@ fn led() -> crate::find::insert::recipe::Recipe {
     crate::find::insert::recipe::Recipe::parse(include_str!("../../../data/recipes/led.toml")).unwrap()
 }
 
-/// An error of the laser plane's offset of 0.3 mm lifts the part and shows little between two looks; the part's sizes along the
-/// stripe, which the plane makes longer and the robot's steps do not, show it, and so does a height that something else measured.
+/// An error of the laser plane's offset of 0.3 mm lifts the part and shows little between two looks; the part's sizes
+/// along the stripe, which the plane makes longer and the robot's steps do not, show it, and so does a height that
+/// something else measured.
 #[test]
 fn sizes_and_a_witness_of_the_height_show_what_two_looks_hide() {
     let mut rng = rand_pcg::Pcg64::seed_from_u64(11);

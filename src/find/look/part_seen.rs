@@ -1,5 +1,5 @@
-//! In: the points of a scan on a part that was measured, the rig. Out: where the camera stood for some of them, and how the
-//! part's measured pose and sizes answer where points move.
+//! In: the points of a scan on a part that was measured, the rig. Out: where the camera stood for some of them, and
+//! how the part's measured pose and sizes answer where points move.
 //! Frame and unit: camera frame and base frame; answers as in `levers`; mm, rad.
 
 use super::levers::{Answer, Lever, Seen, levers, together};
@@ -105,8 +105,8 @@ impl PartSeen {
         levers(&self.seen, rig, self.answer())
     }
 
-    /// What they do all together: camera, lens, laser plane and hand-eye were calibrated at once, and their errors cancel in part.
-    /// `None` where the rig has not all of these.
+    /// What they do all together: camera, lens, laser plane and hand-eye were calibrated at once, and their errors
+    /// cancel in part. `None` where the rig has not all of these.
     pub fn together(&self, rig: &Rig, joint: &JointCovariance) -> Option<Lever> {
         together(&self.seen, rig, joint, self.answer())
     }
@@ -152,8 +152,8 @@ pub(in crate::find) fn middle(seen: &[Seen], of: &Vec3) -> Option<Rigid<Base, Ca
     seen.iter().min_by(|a, b| off(a).total_cmp(&off(b))).map(|s| s.base_from_camera)
 }
 
-/// How some of a scan's points, given as (row, point) in the order of rows, were seen: at most [`SHOTS`] shots and [`PLACES`] in
-/// each. Empty where nobody knows where the camera stood.
+/// How some of a scan's points, given as (row, point) in the order of rows, were seen: at most [`SHOTS`] shots and
+/// [`PLACES`] in each. Empty where nobody knows where the camera stood.
 pub(in crate::find) fn seen_by(points: &Ordered, on: impl Iterator<Item = (u32, usize)>) -> Vec<(usize, Seen)> {
     let mut shots: Vec<(u32, Vec<usize>)> = Vec::new();
     for (row, i) in on {

@@ -19,8 +19,8 @@ pub(super) struct Piece {
     pub row: u32,
 }
 
-/// Pieces of a scan; samples to each side of one; the least of them that must be there, and how flat it is: its thickness over
-/// its width, squared.
+/// Pieces of a scan; samples to each side of one; the least of them that must be there, and how flat it is: its
+/// thickness over its width, squared.
 const PIECES: usize = 4000;
 const BESIDE: i64 = 3;
 const MIN_SAMPLES: usize = 24;
@@ -77,8 +77,8 @@ impl<'a> Surface<'a> {
         pieces.iter().enumerate().for_each(|(i, p)| cells.entry(Surface::key(&p.at)).or_default().push(i));
         Surface { points, pieces, cells }
     }
-    /// The flat piece about the nearest point within `gate` that faces as `normal`. The pieces in cells lie millimetres apart: a
-    /// plane continued so far leaves a curved surface by more than what is sought.
+    /// The flat piece about the nearest point within `gate` that faces as `normal`. The pieces in cells lie
+    /// millimetres apart: a plane continued so far leaves a curved surface by more than what is sought.
     /// `among_all` false stops at the nearest of some pieces: from afar that pulls over a wider range.
     pub fn nearest(&self, p: &Vec3, normal: &Vec3, gate: f64, among_all: bool) -> Option<Piece> {
         let [x, y, z] = Surface::key(p);
@@ -118,7 +118,8 @@ mod tests {
     use crate::scan::{Along, CloudPoint, Shots};
     use glam::Vec3 as Point;
 
-    /// The top of a ball of 9 mm in steps of 0.02 mm: the planes of some pieces leave it, those of the nearest points do not.
+    /// The top of a ball of 9 mm in steps of 0.02 mm: the planes of some pieces leave it, those of the nearest points
+    /// do not.
     #[test]
     fn the_nearest_piece_lies_on_the_curved_surface_beside_a_place() {
         const RADIUS: f32 = 4.5;

@@ -1,5 +1,5 @@
-//! In: a part found in one scan, how its camera stood, the calibrations. Out: where the sensor goes for a second look, and for
-//! each number of each calibration how much of its error the two looks together can show.
+//! In: a part found in one scan, how its camera stood, the calibrations. Out: where the sensor goes for a second
+//! look, and for each number of each calibration how much of its error the two looks together can show.
 //! Frame and unit: base frame, mm; shares of 0 to 2. docs/math.md, Second look.
 
 use super::levers::Lever;
@@ -41,19 +41,20 @@ impl LookPlan {
     }
 }
 
-/// Plans a second look: turned about the part's normal by `turn_deg` (60 to 300) and tilted about its x by `tilt_deg` (-45 to
-/// 45). Errors: numbers out of range, a scan that does not fit the rig.
+/// Plans a second look: turned about the part's normal by `turn_deg` (60 to 300) and tilted about its x by `tilt_deg`
+/// (-45 to 45). Errors: numbers out of range, a scan that does not fit the rig.
 pub fn plan_look(report: &Report, rig: &Rig, turn_deg: f64, tilt_deg: f64) -> Result<LookPlan> {
     if !(60.0..=300.0).contains(&turn_deg) || !(10.0..=45.0).contains(&tilt_deg.abs()) {
         return Err(Fault::usage(format!(
-            "a second look turned by {turn_deg} and tilted by {tilt_deg} degrees, 60 to 300 and 10 to 45 either way are planned"
+            "the second scan is turned by {turn_deg} and tilted by {tilt_deg} degrees; allowed are 60 to 300 and 10 \
+             to 45 to either side"
         ))
-        .cause("a look from nearly the same side makes the same error again")
+        .cause("a scan from nearly the same side repeats the same error")
         .next("give --turn 180 --tilt 20, or what the robot can reach"));
     }
     let part = &report.base_from_part;
     let Some(seen) = &report.budget.seen else {
-        return Err(Fault::refused("the scan does not say how its camera stood")
+        return Err(Fault::refused("the scan does not state its camera's poses")
             .cause("another station's scan, or too few points of one shot on the part")
             .next("give the station that scanned"));
     };

@@ -1,5 +1,5 @@
-//! In: scans of one object that nobody drew, from several sides, the rig that took them. Out: where each scan puts the object
-//! against the first one, with covariance, and how the rig's errors move it: looks at it, as at a part.
+//! In: scans of one object that nobody drew, from several sides, the rig that took them. Out: where each scan puts
+//! the object against the first one, with covariance, and how the rig's errors move it: looks at it, as at a part.
 //! Frame and unit: base frame about the object's middle; mm, rad. docs/math.md, Registration.
 
 use super::levers::{Answer, Seen, levers};
@@ -46,9 +46,10 @@ struct Pair {
 const MIN_MATCHED: usize = 60;
 /// A shift or turn that no surface tells is known so far, mm and rad.
 const UNKNOWN: [f64; 2] = [5.0, 0.05];
-/// What shifts a stripe's centre along the surface's normal and does not scatter, as shares of the sampling step, standard
-/// deviations: in one place the pixels' raster; on all that leans away from the camera one way, times the lean's sine, that it bends
-/// within the light and within the samples that are fitted together (balls of 9 mm in ten scans: 0.04 to 0.06).
+/// What shifts a stripe's centre along the surface's normal and does not scatter, as shares of the sampling step,
+/// standard deviations: in one place the pixels' raster; on all that leans away from the camera one way, times the
+/// lean's sine, that it bends within the light and within the samples that are fitted together (balls of 9 mm in ten
+/// scans: 0.04 to 0.06).
 const LEVEL_BIAS: f64 = 0.01;
 const LEAN_BIAS: f64 = 0.07;
 /// Directions to a unit of a normal's length that are told apart.
@@ -57,7 +58,8 @@ const FACINGS: f64 = 2.0;
 const ROUNDS: i32 = 25;
 /// Where the ways begin, mm in x and y: surfaces of several directions have optima beside the right one.
 const STARTS: [[f64; 2]; 5] = [[0.0, 0.0], [2.0, 0.0], [-2.0, 0.0], [0.0, 2.0], [0.0, -2.0]];
-/// Turns about the vertical with which the best of them goes on, rad: rows of pins have optima a third of a degree to both sides.
+/// Turns about the vertical with which the best of them goes on, rad: rows of pins have optima a third of a degree to
+/// both sides.
 const TURNS: [f64; 3] = [-6e-3, 0.0, 6e-3];
 /// Of the rounds, those that take the nearest of some pieces: from afar that pulls over a wider range.
 const COARSE: i32 = 15;
@@ -135,8 +137,8 @@ struct Way {
     sigma: f64,
 }
 
-/// Brings pieces onto those of the first scan, point to plane [chen92]; what no surface tells stays where it is. `coarse` rounds take
-/// the nearest of some pieces.
+/// Brings pieces onto those of the first scan, point to plane [chen92]; what no surface tells stays where it is.
+/// `coarse` rounds take the nearest of some pieces.
 fn walk(first: &Surface, moving: &[Piece], centre: &Vec3, mut step: Vector6, coarse: i32) -> Option<Way> {
     let mut last = None;
     for round in 0..ROUNDS {
@@ -161,8 +163,8 @@ fn walk(first: &Surface, moving: &[Piece], centre: &Vec3, mut step: Vector6, coa
     last
 }
 
-/// That on which the least is left of all pieces' distances, those without a partner counted as far off, at the scale of the way that
-/// fits best.
+/// That on which the least is left of all pieces' distances, those without a partner counted as far off, at the scale
+/// of the way that fits best.
 fn best_of(ways: &[Way], pieces: usize) -> Option<usize> {
     let scale = TUKEY * ways.iter().map(|w| w.sigma).min_by(f64::total_cmp)?;
     let left = |w: &Way| pieces as f64 - w.pairs.iter().map(|p| 1.0 - (p.off / scale).powi(2).min(1.0)).sum::<f64>();
@@ -179,8 +181,8 @@ fn fit(first: &Surface, moving: &[Piece], centre: &Vec3) -> Option<Fit> {
     ways.extend(TURNS.iter().filter_map(|&turn| walk(first, moving, centre, turned(turn), 0)));
     let way = ways.swap_remove(best_of(&ways, moving.len())?);
     let Way { step, inverse, pairs, sigma } = way;
-    // Pieces of one shot share its pose's error, in either scan; those of one place share what its slope and its edges do to a
-    // stripe's centre.
+    // Pieces of one shot share its pose's error, in either scan; those of one place share what its slope and its
+    // edges do to a stripe's centre.
     let middle = clustered(&pairs, sigma, |p| p.shots[0])
         + clustered(&pairs, sigma, |p| p.shots[1])
         + clustered(&pairs, sigma, |p| p.cell)
@@ -191,8 +193,8 @@ fn fit(first: &Surface, moving: &[Piece], centre: &Vec3) -> Option<Fit> {
     Some(Fit { step, covariance: inverse * middle * inverse, matched: pairs.len(), rms })
 }
 
-/// Registers scans of one object, two or more, each given with what to call it. Errors: a scan that does not fit the rig, too few
-/// surfaces that both saw.
+/// Registers scans of one object, two or more, each given with what to call it. Errors: a scan that does not fit the
+/// rig, too few surfaces that both saw.
 pub fn register(scans: &[(String, Ordered)], rig: &Rig) -> Result<Vec<Registered>> {
     let weak = |what: String| {
         Fault::refused(what)
@@ -224,7 +226,7 @@ pub fn register(scans: &[(String, Ordered)], rig: &Rig) -> Result<Vec<Registered
         let seen = seen_by(points, pieces.iter().map(|p| (p.row, p.point)));
         let [shift, turn] = [0, 3].map(|k| Vec3::new(fit.step[k], fit.step[k + 1], fit.step[k + 2]));
         let budget = budget(&seen, pieces, &centre, rig, fit.covariance)?
-            .ok_or_else(|| weak(format!("{name}: the scan does not say how its camera stood")))?;
+            .ok_or_else(|| weak(format!("{name}: the scan does not state its camera's poses")))?;
         out.push(Registered {
             // What brings the scan back is what it is off by.
             base_from_object: Rigid::new(exp(&-turn), centre - shift),

@@ -1,5 +1,5 @@
-//! In: a part's sizes as they were measured, what all calibrations make expect of them. Out: what they say along the stripe and from
-//! shot to shot, and the gate on it.
+//! In: a part's sizes as they were measured, what all calibrations make expect of them. Out: what they say along the
+//! stripe and from shot to shot, and the gate on it.
 //! Frame and unit: the scan's directions in the part's plane; percent, degrees. docs/math.md, Sizes.
 
 use super::levers::Lever;
@@ -57,7 +57,8 @@ impl SizeCheck {
         let worst = self.expected[0].max(self.expected[1]);
         (3.0 * worst > TOLD_PERCENT).then(|| {
             format!(
-                "the part's sizes tell lengths to {:.1} % only (three sigmas): smaller errors of scale and steps are not tested",
+                "the part's sizes tell lengths to {:.1} % only (three sigmas): smaller errors of scale and steps are \
+                 not tested",
                 3.0 * worst
             )
         })

@@ -1,5 +1,7 @@
-//! In: looks at one part and what else was measured of it, each with its own covariance and the levers of what all share.
-//! Out: one vector with its joint covariance, the pose of least variance, and what should be zero if all were as stated.
+//! In: looks at one part and what else was measured of it, each with its own covariance and the levers of what all
+//! share.
+//! Out: one vector with its joint covariance, the pose of least variance, and what should be zero if all were as
+//! stated.
 //! Frame and unit: base axes, mm and rad; sizes in the part's axes. docs/math.md, Second look (1) to (3).
 
 use super::levers::Lever;
@@ -143,7 +145,8 @@ impl Stack {
         }
     }
 
-    /// How the motion of least variance follows the looks' rows, 6 x all rows (sizes and witness have no say), and its covariance.
+    /// How the motion of least variance follows the looks' rows, 6 x all rows (sizes and witness have no say), and
+    /// its covariance.
     pub fn agreed(&self) -> Result<(DMatrix<f64>, Matrix6<f64>)> {
         let n = 6 * self.looks;
         let weights = self.covariance.view((0, 0), (n, n)).clone_owned().cholesky().ok_or_else(singular)?;
@@ -165,8 +168,8 @@ impl Stack {
         d
     }
 
-    /// What gates judge: differences of any two looks along the part's axes, the sizes of each look along and across its stripe,
-    /// the witness's mean against the agreed pose.
+    /// What gates judge: differences of any two looks along the part's axes, the sizes of each look along and across
+    /// its stripe, the witness's mean against the agreed pose.
     pub fn gauges(&self, looks: &[Look], into_part: &Matrix6<f64>, follow: &DMatrix<f64>) -> Result<Gauges> {
         let n = self.values.len();
         let mut rows: Vec<DVector<f64>> = Vec::new();
@@ -217,7 +220,7 @@ impl Stack {
 }
 
 pub(in crate::find) fn singular() -> Fault {
-    Fault::refused("the looks' covariances cannot be combined: a standard deviation is zero")
-        .cause("a calibration or recipe whose uncertainty is stated as nothing")
+    Fault::refused("the scans' covariances cannot be combined: a standard deviation is zero")
+        .cause("a calibration or recipe with a stated uncertainty of zero")
         .next("calibrate with uncertainty, or give the recipe's robot its repeatability")
 }

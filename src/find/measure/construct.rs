@@ -227,7 +227,7 @@ fn needs(c: &Construction, least: usize, most: usize) -> Result<()> {
     if (least..=most).contains(&c.of.len()) {
         return Ok(());
     }
-    Err(Fault::input(format!("a {:?} of {} things, wanted {least} to {most}", c.kind, c.of.len()).to_lowercase())
+    Err(Fault::input(format!("a {:?} of {} things; allowed: {least} to {most}", c.kind, c.of.len()).to_lowercase())
         .cause("an impossible construction")
         .next("correct 'of' in the recipe"))
 }

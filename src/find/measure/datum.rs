@@ -26,8 +26,8 @@ pub(in crate::find) struct Datum {
     pub sigma: f64,
 }
 
-/// A level start laid onto the part's faces. A long part rises by more than any gate from end to end at a degree of tilt:
-/// what lies at its ends can be told only afterwards. As it was where too few points lie on the faces.
+/// A level start laid onto the part's faces. A long part rises by more than any gate from end to end at a degree of
+/// tilt: what lies at its ends can be told only afterwards. As it was where too few points lie on the faces.
 pub(in crate::find) fn laid(
     points: &Ordered,
     drawing: &Drawing,
@@ -62,8 +62,8 @@ pub(in crate::find) fn fit_datum(
     round: usize,
 ) -> Result<Datum> {
     let gate = if round == 0 { 4.0 * options.height_gate_mm } else { 2.0 * options.height_gate_mm };
-    // Of a point that is nearer to an edge than its light reaches some comes from beside the face: its centre is off, up at one end of the
-    // stripe and down at the other.
+    // Of a point that is nearer to an edge than its light reaches some comes from beside the face: its centre is off,
+    // up at one end of the stripe and down at the other.
     let reach = points.reach_mm.min(FARTHEST * options.unit()).max(options.margin_mm);
     let mut inside: Vec<(Vector3<f64>, f64, u32)> = Vec::new();
     let mut from_edge = Vec::new();
@@ -87,7 +87,8 @@ pub(in crate::find) fn fit_datum(
     let rows: Vec<_> = inside.into_iter().zip(from_edge).filter(|(_, d)| *d >= margin).map(|(row, _)| row).collect();
     if rows.len() < MIN_SURFACE {
         return Err(Fault::refused(format!(
-            "{} points lie on the part's level surfaces (to {} mm, from height_gate_mm), at least {MIN_SURFACE} are needed",
+            "{} points lie on the part's level surfaces (to {} mm, from height_gate_mm), at least {MIN_SURFACE} are \
+             needed",
             rows.len(),
             gate
         ))
@@ -109,8 +110,9 @@ mod tests {
     use crate::scan::{Along, CloudPoint, Shots};
     use rand::{Rng, SeedableRng};
 
-    /// A level plate of 24 x 16 mm in steps of 0.2 mm, its stripe slanted by `lean`: its light reaches 1.5 mm, and so near to the plate's two
-    /// ends along the stripe half of a profile is of what lies beside it. The centre is off by up to 0.1 mm, up at one end, down at the other.
+    /// A level plate of 24 x 16 mm in steps of 0.2 mm, its stripe slanted by `lean`: its light reaches 1.5 mm, and so
+    /// near to the plate's two ends along the stripe half of a profile is of what lies beside it. The centre is off
+    /// by up to 0.1 mm, up at one end, down at the other.
     fn plate(lean: f32, stripe_px: Option<f32>) -> Ordered {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(3);
         let mut cloud = Vec::new();

@@ -1,5 +1,6 @@
 //! In: rows of light beside edges, each from a shot and a piece of an edge. Out: the step that explains them, and its
-//! covariance with what samples have in common: their shot's pose and their piece of edge (docs/math.md, Insertion (4)).
+//! covariance with what samples have in common: their shot's pose and their piece of edge (docs/math.md, Insertion
+//! (4)).
 //! Frame and unit: as `lit_edges`; light as a share, mm, rad.
 
 use nalgebra::SVector;
@@ -40,8 +41,8 @@ struct Piece {
     rows: Vec<usize>,
 }
 
-/// Solves for the step from `x`. `bias`: expected size of a piece's offset, mm; `scatter`: of a shot's position, mm; `unit`: the
-/// recipe's unit of length, mm.
+/// Solves for the step from `x`. `bias`: expected size of a piece's offset, mm; `scatter`: of a shot's position, mm;
+/// `unit`: the recipe's unit of length, mm.
 pub(in crate::find) fn solve(
     rows: &[Row],
     x: &Unknowns,
@@ -120,8 +121,8 @@ fn inverted(a: &Square) -> Option<Square> {
     Some(Square::from_fn(|i, k| inverse[(i, k)] * scale[i] * scale[k]))
 }
 
-/// Offsets of the pieces, plus the larger of two accounts of noise and poses: what the residuals of whole shots show when
-/// each is left out in turn, and the samples' own noise with the poses' scatter.
+/// Offsets of the pieces, plus the larger of two accounts of noise and poses: what the residuals of whole shots show
+/// when each is left out in turn, and the samples' own noise with the poses' scatter.
 #[allow(clippy::too_many_arguments)]
 fn spread(
     rows: &[Row],

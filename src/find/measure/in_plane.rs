@@ -35,11 +35,9 @@ pub(in crate::find) fn fit_edges(
     let locating = axes[0] + axes[1];
     if locating < MIN_EDGES {
         return Err(Fault::refused(format!(
-            "{} ends of surfaces lie within edge_gate_mm = {} of the drawn edges ({} along the stripe, {} from shot to shot), at least {MIN_EDGES} are needed",
-            locating,
-            options.edge_gate_mm,
-            axes[0],
-            axes[1]
+            "{} ends of surfaces lie within edge_gate_mm = {} of the drawn edges ({} along the stripe, {} from shot \
+             to shot), at least {MIN_EDGES} are needed",
+            locating, options.edge_gate_mm, axes[0], axes[1]
         ))
         .cause("the part is hidden, is another one, or the search was misled")
         .next("look at the picture of the match, then scan the part again"));

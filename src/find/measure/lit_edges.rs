@@ -1,5 +1,6 @@
-//! In: the points of a scan near a part whose pose is known to some tenths of a millimetre. Out: its place and turn from
-//! how much of the sheet's light each sample beside an edge still sends back (docs/math.md, Insertion (3) and (4)).
+//! In: the points of a scan near a part whose pose is known to some tenths of a millimetre. Out: its place and turn
+//! from how much of the sheet's light each sample beside an edge still sends back (docs/math.md, Insertion (3) and
+//! (4)).
 //! Frame and unit: a correction in the part frame: x y mm, turn about z rad; light as a share of a fully lit sample's.
 
 use super::edge_pieces::{N, Prior, Row, Solved, Unknowns, solve};
@@ -13,9 +14,9 @@ use crate::find::model::face::Face;
 use crate::geometry::{Base, Camera, Part, Rigid, Vec3};
 use nalgebra::{Matrix3, Rotation2, Vector2, Vector3};
 
-/// Prior mean and standard deviation of growth and width, in the recipe's unit of about 1 mm, as are the lengths below: optics
-/// blur a stripe's end by about a pixel, a line laser is about a tenth of a millimetre wide; both are measured where edges are
-/// sharp.
+/// Prior mean and standard deviation of growth and width, in the recipe's unit of about 1 mm, as are the lengths
+/// below: optics blur a stripe's end by about a pixel, a line laser is about a tenth of a millimetre wide; both are
+/// measured where edges are sharp.
 const PRIORS: [Prior; 4] = [(3, 0.0, 0.05), (4, 0.0, 0.05), (5, 0.25, 0.15), (6, 0.12, 0.08)];
 /// Sizes are the drawing's where the part is placed, and are all but free where they are measured.
 const DRAWN: f64 = 1e-9;
@@ -32,8 +33,8 @@ const DEEP: f64 = 0.6;
 const NEAR: f64 = 0.8;
 /// Edges farther away than this take no light.
 const BEYOND: f64 = 1.0;
-/// Fully lit samples around a partly lit one, within the first of these distances that holds enough, give its full light:
-/// between a row of pins and an edge none are near.
+/// Fully lit samples around a partly lit one, within the first of these distances that holds enough, give its full
+/// light: between a row of pins and an edge none are near.
 const AROUND: [f64; 4] = [1.6, 3.2, 6.4, 12.8];
 const MIN_FULL: usize = 6;
 /// A second edge at least so many widths away dims a sample a little, which is predicted; a nearer one decides it.
@@ -91,8 +92,8 @@ fn settle(
     Some((x, solved, used))
 }
 
-/// Fits the light of the samples beside locating edges; `None` where too few are seen. With `shape` the part's sizes are unknown
-/// too, and start there.
+/// Fits the light of the samples beside locating edges; `None` where too few are seen. With `shape` the part's sizes
+/// are unknown too, and start there.
 pub(in crate::find) fn fit_light(
     points: &Ordered,
     pose: &Rigid<Base, Part>,
@@ -149,8 +150,9 @@ fn face_of(q: &Vec3, faces: &[Face], gate: f64) -> Option<f64> {
     faces.iter().map(|f| f.z).find(|z| (q.z - z).abs() <= gate)
 }
 
-/// By how much each row's shot was turned about the part's normal against the shot that saw its middle: on a turntable the stripe
-/// crosses a part in another direction at every place. None where nobody knows where the camera stood.
+/// By how much each row's shot was turned about the part's normal against the shot that saw its middle: on a
+/// turntable the stripe crosses a part in another direction at every place. None where nobody knows where the camera
+/// stood.
 fn turns(points: &Ordered, local: &[Option<Vec3>], pose: &Rigid<Base, Part>) -> Vec<Rotation2<f64>> {
     let on: Vec<u32> = (0..local.len()).filter(|&i| local[i].is_some()).map(|i| points.row[i]).collect();
     let middle = on.get(on.len() / 2).and_then(|row| points.from_camera[*row as usize]);
@@ -163,8 +165,8 @@ fn turns(points: &Ordered, local: &[Option<Vec3>], pose: &Rigid<Base, Part>) -> 
     points.from_camera.iter().map(turn).collect()
 }
 
-/// The usual steps between neighbouring samples along the stripe and from shot to shot, in the part's plane as the shot that saw its
-/// middle has them.
+/// The usual steps between neighbouring samples along the stripe and from shot to shot, in the part's plane as the
+/// shot that saw its middle has them.
 fn sampling(
     points: &Ordered,
     local: &[Option<Vec3>],
@@ -186,8 +188,8 @@ fn sampling(
     Some([step(0, 1)?, step(1, 0)?])
 }
 
-/// How far the sheet moves in the part's plane for a millimetre of height, from the points of the shots themselves, which
-/// lie in it, as the shot that saw the part's middle has it; zero where they all lie on one line.
+/// How far the sheet moves in the part's plane for a millimetre of height, from the points of the shots themselves,
+/// which lie in it, as the shot that saw the part's middle has it; zero where they all lie on one line.
 fn slant(points: &Ordered, local: &[Option<Vec3>], turns: &[Rotation2<f64>], unit: f64) -> Vector2<f64> {
     let mut rows = std::collections::BTreeMap::<u32, Vec<Vec3>>::new();
     for (q, row) in local.iter().zip(&points.row) {
@@ -306,9 +308,9 @@ fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns) -> Option<Row> {
     Some(Row { j, residual: s.light - lit, shot: s.row, slope, normal: [nx, ny], piece: edges.piece(edge, px, py) })
 }
 
-/// How many widths of the light's fall a place lies inside an edge, the shares of the two directions in its normal, and that
-/// width in mm. The light falls off along a curved edge as well: a disc is lit by less, a hole's rim by more than a straight
-/// edge.
+/// How many widths of the light's fall a place lies inside an edge, the shares of the two directions in its normal,
+/// and that width in mm. The light falls off along a curved edge as well: a disc is lit by less, a hole's rim by more
+/// than a straight edge.
 fn widths_inside(
     edge: &EdgeSample,
     px: f64,

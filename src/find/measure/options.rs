@@ -16,8 +16,8 @@ pub struct MeasureOptions {
     /// Standard deviation of what a piece of an edge has in common and the model of partly lit samples does not
     /// explain (a wall that shows, a chamfer, the pixels' raster), as a share of the sampling step, 0 to 0.5.
     pub edge_bias: f64,
-    /// Standard deviation of a part's sizes against the drawing, all of them together, as a share, 0 to 0.1; a third of it is
-    /// how far one direction differs from the other.
+    /// Standard deviation of a part's sizes against the drawing, all of them together, as a share, 0 to 0.1; a third
+    /// of it is how far one direction differs from the other.
     pub size_sigma: f64,
 }
 
@@ -40,7 +40,7 @@ impl MeasureOptions {
             if (a..=b).contains(&v) {
                 Ok(())
             } else {
-                Err(Fault::usage(format!("{name} is {v}, wanted {a} to {b}")).next("correct [measure] in the recipe"))
+                Err(Fault::usage(format!("{name} is {v}; allowed: {a} to {b}")).next("correct [measure] in the recipe"))
             }
         };
         range("height_gate_mm", self.height_gate_mm, 1e-4, 100.0)?;

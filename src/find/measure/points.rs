@@ -1,5 +1,5 @@
-//! In: a cloud and the shots it is from. Out: its points in the order of the sensor: one row a shot, one column a pixel of the
-//! stripe, so that a point's neighbours along the stripe and in the next shot are known.
+//! In: a cloud and the shots it is from. Out: its points in the order of the sensor: one row a shot, one column a
+//! pixel of the stripe, so that a point's neighbours along the stripe and in the next shot are known.
 //! Frame and unit: base frame, mm.
 
 use super::options::MeasureOptions;
@@ -29,7 +29,8 @@ pub struct Ordered {
     pub from_camera: Vec<Option<Rigid<Base, Camera>>>,
     /// Pixel (u, v) of each point.
     pub pixel: Vec<[f32; 2]>,
-    /// How far along a surface the light lies that a point was measured from, mm; 0 where nobody measured the stripe's width.
+    /// How far along a surface the light lies that a point was measured from, mm; 0 where nobody measured the
+    /// stripe's width.
     pub reach_mm: f64,
     columns: usize,
     index: Vec<u32>,
@@ -93,8 +94,8 @@ impl Ordered {
         out
     }
 
-    /// Two widths of the stripe, and along a slanted one what profiles along an image axis go farther, in the usual steps between
-    /// neighbours along it.
+    /// Two widths of the stripe, and along a slanted one what profiles along an image axis go farther, in the usual
+    /// steps between neighbours along it.
     fn reach(&self, stripe_px: f32, along: Along) -> f64 {
         let across = |i: usize| self.pixel[i][usize::from(along == Along::U)];
         let beside = |i: usize| self.at(i64::from(self.row[i]), i64::from(self.column[i]) + 1);

@@ -158,7 +158,8 @@ fn in_plane(step: &Vector3<f64>) -> Rigid<Part, Part> {
     Rigid::from_vectors(&Vec3::new(0.0, 0.0, step.z), Vec3::new(step.x, step.y, 0.0))
 }
 
-/// Of x y z rx ry rz, from that of the datum (z rx ry), that in the plane (x y rz), and what all heights have in common, mm.
+/// Of x y z rx ry rz, from that of the datum (z rx ry), that in the plane (x y rz), and what all heights have in
+/// common, mm.
 fn covariance(datum: &Matrix3<f64>, in_plane: &Matrix3<f64>, level_bias: f64) -> Matrix6<f64> {
     let mut out = Matrix6::zeros();
     for (part, at) in [(datum, [2, 3, 4]), (in_plane, [0, 1, 5])] {

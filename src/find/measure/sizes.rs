@@ -1,4 +1,5 @@
-//! In: ends of surfaces and light beside their edges, the drawing. Out: the sizes that were measured against the drawn ones.
+//! In: ends of surfaces and light beside their edges, the drawing. Out: the sizes that were measured against the
+//! drawn ones.
 //! Frame and unit: the part's axes; shares, shear in rad. docs/math.md, Sizes.
 
 use super::lit_edges::Lit;

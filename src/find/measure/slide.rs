@@ -1,5 +1,5 @@
-//! In: the points of a scan, a drawing, a pose that may be shifted: along a long part, or by a shadow. Out: the shift at
-//! which most points lie where the drawing says.
+//! In: the points of a scan, a drawing, a pose that may be shifted: along a long part, or by a shadow. Out: the shift
+//! at which most points lie where the drawing says.
 //! Frame and unit: part frame, mm. Long parallel edges fit at every shift (the aperture problem), so the
 //! search alone cannot tell; what lies at the part's ends can.
 
@@ -65,8 +65,8 @@ fn shifted(pose: Rigid<Base, Part>, by: [f64; 2]) -> Rigid<Base, Part> {
     pose * Rigid::<Part, Part>::from_vectors(&Vec3::zeros(), Vec3::new(by[0], by[1], 0.0))
 }
 
-/// The pose laid onto the part's faces and shifted along its long axis to where the points agree best; as it was for parts
-/// that are not long.
+/// The pose laid onto the part's faces and shifted along its long axis to where the points agree best; as it was for
+/// parts that are not long.
 pub fn slide(
     points: &Ordered,
     drawing: &Drawing,
@@ -89,9 +89,9 @@ pub fn slide(
     shifted(start, along(best))
 }
 
-/// The pose laid onto the part's faces and shifted to where the points around it agree best. A shadow beside a part has as
-/// straight an edge as the part, and windows have theirs on the same side: a map's edges fit a part that is shifted by the length of
-/// its shadow nearly as well. The points do not: none lies in a shadow.
+/// The pose laid onto the part's faces and shifted to where the points around it agree best. A shadow beside a part
+/// has as straight an edge as the part, and windows have theirs on the same side: a map's edges fit a part that is
+/// shifted by the length of its shadow nearly as well. The points do not: none lies in a shadow.
 pub fn settle(
     points: &Ordered,
     drawing: &Drawing,

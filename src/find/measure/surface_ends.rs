@@ -40,7 +40,8 @@ pub struct Observation {
 /// degrees to the sweep are seen along the stripe and from shot to shot.
 const LEAST_COSINE: f64 = 0.6;
 
-/// Where a sample's neighbours are, by side: the axis as in [`Observation::axis`], and the way to the next one in rows and columns.
+/// Where a sample's neighbours are, by side: the axis as in [`Observation::axis`], and the way to the next one in
+/// rows and columns.
 const SIDES: [(usize, i64, i64); 4] = [(0, 0, 1), (0, 0, -1), (1, 1, 0), (1, -1, 0)];
 /// So many steps of an axis give their median.
 const MOST_STEPS: usize = 4000;
@@ -72,8 +73,8 @@ struct End {
 }
 
 /// Ends of surfaces: a sample on a face whose next neighbour is not. The end lies where the light that
-/// the last samples still send back says: a sample that is lit by half counts as half a step. With them come the usual steps
-/// between samples along the stripe and from shot to shot, mm.
+/// the last samples still send back says: a sample that is lit by half counts as half a step. With them come the
+/// usual steps between samples along the stripe and from shot to shot, mm.
 pub(in crate::find) fn surface_ends(
     points: &Ordered,
     local: &[Option<Vec3>],
@@ -160,7 +161,8 @@ impl Samples<'_> {
 }
 
 impl End {
-    /// The end measured against the drawn edge; `None` where none is near in that direction. `ruler`: the usual last step.
+    /// The end measured against the drawn edge; `None` where none is near in that direction. `ruler`: the usual last
+    /// step.
     fn at_edge(&self, ruler: f64, edges: &EdgeIndex, gate: f64) -> Option<Observation> {
         let reach = ruler * (0.5 + self.lit);
         let (x, y) = (self.x + self.nx * reach, self.y + self.ny * reach);

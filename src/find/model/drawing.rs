@@ -64,7 +64,7 @@ impl Drawing {
             }
             Err(Fault::input(format!("the drawing has {value:.0} {what}, limit {most:.0}"))
                 .cause("a slipped decimal point, another unit, or more than one part")
-                .next("correct the sizes, or draw only what the scan is to be compared with"))
+                .next("correct the sizes, or draw only the outline that the scan shows"))
         };
         limit("corners", corners as f64, MOST_CORNERS)?;
         limit("mm of edges", self.edge_length(), MOST_EDGE_MM)?;

@@ -23,8 +23,8 @@ struct Contour {
     element: usize,
 }
 
-/// -1 where the material lies right of the contour at a place, 1 where left, or where nothing tells; `None` where it lies on
-/// both sides or on neither. `r` points right.
+/// -1 where the material lies right of the contour at a place, 1 where left, or where nothing tells; `None` where it
+/// lies on both sides or on neither. `r` points right.
 fn side(c: &Contour, face: Option<&Face>, [x, y]: [f64; 2], [rx, ry]: [f64; 2]) -> Option<f64> {
     let sign = match (c.closed && c.inside != Inside::Either, face) {
         (true, Some(f)) => {

@@ -15,8 +15,8 @@ pub struct EdgeIndex {
 
 /// Distance between samples, in units.
 const SPACING: f64 = 0.05;
-/// Length of edge whose samples have what is not modelled in common, in units: about three widths of the sheet's light and a
-/// few samples, over which walls, chamfers and pixels change.
+/// Length of edge whose samples have what is not modelled in common, in units: about three widths of the sheet's
+/// light and a few samples, over which walls, chamfers and pixels change.
 const PIECE: f64 = 4.0;
 
 /// The bucket of a place: one unit wide; no gate reaches farther than three of them.

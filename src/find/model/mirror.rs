@@ -1,9 +1,11 @@
-//! In: a drawing. Out: whether a part of it looks the same in a mirror, so that a scan of it cannot tell mirrored pictures.
+//! In: a drawing. Out: whether a part of it looks the same in a mirror, so that a scan of it cannot tell mirrored
+//! pictures.
 //! Frame and unit: part frame, mm; shares of the drawn surfaces.
 
 use super::drawing::Drawing;
 
-/// Places along a side of the box that is compared, and the share of the surfaces that has to differ for a scan to tell.
+/// Places along a side of the box that is compared, and the share of the surfaces that has to differ for a scan to
+/// tell.
 const SIDE: usize = 120;
 const TOLD: f64 = 0.002;
 

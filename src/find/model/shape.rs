@@ -1,5 +1,5 @@
-//! In: one shape of a drawing, as a person wrote it. Out: the shape, checked; its outline as a polyline, counter-clockwise
-//! where it is closed.
+//! In: one shape of a drawing, as a person wrote it. Out: the shape, checked; its outline as a polyline,
+//! counter-clockwise where it is closed.
 //! Frame and unit: the part's frame; mm.
 
 use super::outline::{arc, area};

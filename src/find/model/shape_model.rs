@@ -35,8 +35,8 @@ pub struct ShapeModel {
     pub half_size: [f64; 2],
     /// Centre of that box from the reference point, px.
     pub centre: [f64; 2],
-    /// How many edge places of level 0 hold what one of them alone would tell, 1 or more: neighbours along an edge see the same
-    /// noise, layers that show the same edge see the same edge.
+    /// How many edge places of level 0 hold what one of them alone would tell, 1 or more: neighbours along an edge
+    /// see the same noise, layers that show the same edge see the same edge.
     pub redundancy: f64,
 }
 
@@ -64,16 +64,16 @@ impl ModelOptions {
     pub fn check(&self) -> Result<()> {
         if !(0.02..=1.0).contains(&self.contrast) {
             return Err(
-                Fault::usage(format!("contrast is {}, wanted 0.02 to 1", self.contrast)).next("correct contrast")
+                Fault::usage(format!("contrast is {}; allowed: 0.02 to 1", self.contrast)).next("correct contrast")
             );
         }
         if !(30..=5000).contains(&self.max_points) {
-            return Err(Fault::usage(format!("max_points is {}, wanted 30 to 5000", self.max_points))
+            return Err(Fault::usage(format!("max_points is {}; allowed: 30 to 5000", self.max_points))
                 .next("correct max_points"));
         }
         if !(1..=8).contains(&self.max_levels) {
             return Err(
-                Fault::usage(format!("max_levels is {}, wanted 1 to 8", self.max_levels)).next("correct max_levels")
+                Fault::usage(format!("max_levels is {}; allowed: 1 to 8", self.max_levels)).next("correct max_levels")
             );
         }
         Ok(())
@@ -134,7 +134,7 @@ impl ShapeModel {
         options.check()?;
         drawing.check()?;
         if !(mm_per_px > 0.0 && mm_per_px.is_finite()) {
-            return Err(Fault::usage(format!("mm_per_px is {mm_per_px}, wanted above 0"))
+            return Err(Fault::usage(format!("mm_per_px is {mm_per_px}; allowed: above 0"))
                 .next("give the edge of the map's cells in mm"));
         }
         // Of long edges no more places than the model can hold, many times over.
@@ -201,10 +201,11 @@ impl ShapeModel {
 /// Square of the distance beyond which two places share no noise, px²: exp(-d²/4) is below a thousandth.
 const APART_SQUARED: f64 = 28.0;
 
-/// Sum of a place's correlations with all places, itself included, mean over the places: by how much the variance of what they tell
-/// together exceeds that of as many independent ones. exp(-d²/4) is the correlation that the 5x5 plane fit (sigma 1 px) leaves at a
-/// distance of d px. Places of several layers count alike: what moves an edge in one (the sheet's width, the raster of pixels, a
-/// chamfer) moves it in the others, so a second layer guards against gaps but does not halve the variance.
+/// Sum of a place's correlations with all places, itself included, mean over the places: by how much the variance of
+/// what they tell together exceeds that of as many independent ones. exp(-d²/4) is the correlation that the 5x5 plane
+/// fit (sigma 1 px) leaves at a distance of d px. Places of several layers count alike: what moves an edge in one
+/// (the sheet's width, the raster of pixels, a chamfer) moves it in the others, so a second layer guards against gaps
+/// but does not halve the variance.
 fn redundancy(points: &[ModelPoint]) -> f64 {
     let shared = |p: &ModelPoint, o: &ModelPoint| {
         let d2 = (o.x - p.x).powi(2) + (o.y - p.y).powi(2);

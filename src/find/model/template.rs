@@ -1,5 +1,5 @@
-//! In: a picture and the region of it that shows the part; or the file that was made of it. Out: a model with where it came from,
-//! for searches in other pictures; the file.
+//! In: a picture and the region of it that shows the part; or the file that was made of it. Out: a model with where
+//! it came from, for searches in other pictures; the file.
 //! Frame and unit: pixels of the picture; places of the model about the region's middle, turn 0 as in the picture.
 
 use super::shape_model::{MIN_POINTS, ModelOptions, ModelPoint, ShapeModel};
@@ -33,7 +33,8 @@ const FARTHEST_PX: f64 = 131_072.0;
 const MOST_PLACES: usize = 5000;
 
 impl Template {
-    /// Learns what `region` (x, y, width, height; all of the picture where `None`) shows. `source` is the picture's name and SHA-256.
+    /// Learns what `region` (x, y, width, height; all of the picture where `None`) shows. `source` is the picture's
+    /// name and SHA-256.
     ///
     /// # Errors
     /// A region that leaves the picture, one without a clear outline.
@@ -47,8 +48,9 @@ impl Template {
         Template::teach_in_part(name, image, None, region, source, options)
     }
 
-    /// The same of a picture that is hidden where `hidden` is lit, as a part that was cut out in an editor: nothing is learnt there.
-    /// Visible levels are carried on behind the rim, so that the rim itself makes no edge, and an edge along it is kept.
+    /// The same of a picture that is hidden where `hidden` is lit, as a part that was cut out in an editor: nothing
+    /// is learnt there. Visible levels are carried on behind the rim, so that the rim itself makes no edge, and an
+    /// edge along it is kept.
     ///
     /// # Errors
     /// As [`Template::teach`].
@@ -93,7 +95,7 @@ impl Template {
     /// Text that is no template, and numbers that no picture gives.
     pub fn parse(text: &str) -> Result<Template> {
         let strange = |what: String| {
-            Fault::input(format!("is no taught part: {what}"))
+            Fault::input(format!("is not a taught part: {what}"))
                 .cause("another file, another version, or edited by hand")
                 .next("teach the part again: sheetlight teach PICTURE --region X,Y,W,H --out PART.json")
         };
@@ -109,11 +111,15 @@ impl Template {
 
 fn check(model: &ShapeModel) -> std::result::Result<(), String> {
     if !(1..=8).contains(&model.levels.len()) {
-        return Err(format!("{} levels, wanted 1 to 8", model.levels.len()));
+        return Err(format!("{} levels; allowed: 1 to 8", model.levels.len()));
     }
     for (level, points) in model.levels.iter().enumerate() {
         if !(MIN_POINTS..=MOST_PLACES).contains(&points.len()) {
-            return Err(format!("{} edge places on level {level}, wanted {MIN_POINTS} to {MOST_PLACES}", points.len()));
+            return Err(format!(
+                "{} edge places on level {level}; allowed: {MIN_POINTS} to \
+                                {MOST_PLACES}",
+                points.len()
+            ));
         }
         let strange = |p: &ModelPoint| {
             let unit = (p.gx.hypot(p.gy) - 1.0).abs() < 1e-6;
@@ -134,7 +140,7 @@ fn check(model: &ShapeModel) -> std::result::Result<(), String> {
         return Err(format!("a radius of {} px, its edges reach {reach:.3} px", model.radius));
     }
     if !(1.0..=MOST_PLACES as f64).contains(&model.redundancy) {
-        return Err(format!("a redundancy of {}, wanted 1 to {MOST_PLACES}", model.redundancy));
+        return Err(format!("a redundancy of {}; allowed: 1 to {MOST_PLACES}", model.redundancy));
     }
     Ok(())
 }

@@ -1,5 +1,5 @@
-//! In: a level and the places of a model's features at every turn. Out: the peaks of their sums, computed by WGSL stages;
-//! the same numbers as the CPU's. Frame and unit: strided places of the level; a perfect feature scores 4.
+//! In: a level and the places of a model's features at every turn. Out: the peaks of their sums, computed by WGSL
+//! stages; the same numbers as the CPU's. Frame and unit: strided places of the level; a perfect feature scores 4.
 
 use super::level::{Level, Placed};
 use crate::fault::{Fault, Result};
@@ -56,8 +56,8 @@ const TRIAL_RUNS: usize = 3;
 const TRIAL_ROUNDS: usize = 4;
 
 impl Accelerator {
-    /// The best adapter if it is a GPU, with the rule of this machine. A software adapter runs the sums on the very cores
-    /// that the CPU's own code would use: it is not even measured.
+    /// The best adapter if it is a GPU, with the rule of this machine. A software adapter runs the sums on the very
+    /// cores that the CPU's own code would use: it is not even measured.
     pub fn open() -> Option<Accelerator> {
         let device = Device::open().ok().filter(|d| d.info.kind != "CPU")?;
         let mut accelerator = Accelerator::on(&device).ok()?;
@@ -83,8 +83,8 @@ impl Accelerator {
         fits && self.rule.is_none_or(|r| r.pays(features as u64 * u64::from(frame.columns * frame.rows)))
     }
 
-    /// Times the same small searches here and on the CPU. Here the slope is an addition's cost, what is left is fixed; on the
-    /// CPU nothing is.
+    /// Times the same small searches here and on the CPU. Here the slope is an addition's cost, what is left is
+    /// fixed; on the CPU nothing is.
     pub fn measured(&self) -> Result<Rule> {
         let level = Level::trial(TRIAL);
         let placed = TRIAL_TURNS.map(|turns| Level::trial_turns(turns, TRIAL_FEATURES));
@@ -106,7 +106,8 @@ impl Accelerator {
             drop(level.peaks(&placed[1], LEAST));
             Ok(())
         })? / additions[1];
-        // Where more work took no longer, or so much longer that less would take none, something else had the processors.
+        // Where more work took no longer, or so much longer that less would take none, something else had the
+        // processors.
         for _ in 0..TRIAL_ROUNDS {
             let few = best(&|| self.peaks(&level, &placed[0], LEAST).map(drop))?;
             let many = best(&|| self.peaks(&level, &placed[1], LEAST).map(drop))?;

@@ -1,4 +1,5 @@
-//! In: where in a scene parts may lie, as corners. Out: the cells that a search there needs, and whether a match lies in it.
+//! In: where in a scene parts may lie, as corners. Out: the cells that a search there needs, and whether a match lies
+//! in it.
 //! Frame and unit: pixels of the scene, an integer is a pixel's centre.
 
 use super::options::SearchOptions;
@@ -32,7 +33,7 @@ impl Area {
                 .next("give three corners or more, x,y each, in px")
         };
         if !(3..=MOST_CORNERS).contains(&corners.len()) {
-            return Err(bad(format!("the polygon has {} corners, wanted 3 to {MOST_CORNERS}", corners.len())));
+            return Err(bad(format!("the polygon has {} corners; allowed: 3 to {MOST_CORNERS}", corners.len())));
         }
         if corners.iter().flatten().any(|v| !(v.abs() <= 1e6)) {
             return Err(bad("a corner of the polygon is farther than 1000000 px away".into()));
@@ -40,7 +41,7 @@ impl Area {
         let around = corners.iter().zip(corners.iter().cycle().skip(1));
         let twice: f64 = around.map(|(a, b)| a[0] * b[1] - b[0] * a[1]).sum();
         if twice.abs() < 2.0 {
-            return Err(bad(format!("the polygon holds {:.2} px, wanted 1 or more", 0.5 * twice.abs())));
+            return Err(bad(format!("the polygon holds {:.2} px; allowed: 1 or more", 0.5 * twice.abs())));
         }
         Ok(Area { corners })
     }
@@ -51,7 +52,7 @@ impl Area {
     /// Sizes that are not above 0.
     pub fn rectangle([x, y, width, height]: [f64; 4]) -> Result<Area> {
         if !(width > 0.0 && height > 0.0) {
-            return Err(Fault::usage(format!("the region is {width} by {height} px, wanted above 0"))
+            return Err(Fault::usage(format!("the region is {width} by {height} px; allowed: above 0"))
                 .cause("two corners instead of a corner and a size")
                 .next("give x,y,width,height in px"));
         }
@@ -90,7 +91,7 @@ impl Area {
         };
         let (Some((x0, x1)), Some((y0, y1))) = (along(0, scene.width()), along(1, scene.height())) else {
             return Err(Fault::usage(format!(
-                "the region to search lies beside the picture of {}x{} px",
+                "the search region is outside the picture of {}x{} px",
                 scene.width(),
                 scene.height()
             ))

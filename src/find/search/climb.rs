@@ -1,5 +1,5 @@
-//! In: the directions of one pyramid level, a model's points there and a pose. Out: how well they meet, and the best pose
-//! around it, by steps of a cell and of as much turn.
+//! In: the directions of one pyramid level, a model's points there and a pose. Out: how well they meet, and the best
+//! pose around it, by steps of a cell and of as much turn.
 //! Frame and unit: pixels of the scene in poses, cells of the level inside; scores from 0 to 1.
 
 use super::options::SearchOptions;
@@ -163,8 +163,9 @@ impl<const ROWS: usize, const LANES: usize> Around<ROWS, LANES> {
     }
 }
 
-/// Other hills near a pose, by whole cells at its turn: beside a step of height lies a shadow, whose cells count half, so a
-/// pose as far off as a shadow is wide stands on a hill of its own, and climbing from the coarser level may end on that one.
+/// Other hills near a pose, by whole cells at its turn: beside a step of height lies a shadow, whose cells count
+/// half, so a pose as far off as a shadow is wide stands on a hill of its own, and climbing from the coarser level
+/// may end on that one.
 pub(in crate::find) fn hills(
     layers: &[Directions],
     points: &[ModelPoint],

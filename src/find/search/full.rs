@@ -16,8 +16,8 @@ use crate::find::scene::{Kind, Scene, from_level};
 use crate::stages::shape::frame::STRIDE;
 use rayon::prelude::*;
 
-/// A model that reaches farther than this many times the map is not searched: no place of it has half of its edges there, and
-/// turns and memory grow with its reach.
+/// A model that reaches farther than this many times the map is not searched: no place of it has half of its edges
+/// there, and turns and memory grow with its reach.
 const MOST_ACROSS: f64 = 4.0;
 
 /// Rounding moves what is held at a limit of its range by less (rad, share of the scale): the limit itself lies inside.
@@ -99,7 +99,7 @@ fn search(
     for p in &model.levels[0] {
         if !scene.layers.iter().any(|l| l.kind == p.kind) {
             return Err(Fault::usage(format!("the model has {:?} edges, the scene has no such layer", p.kind))
-                .cause("a model of heights is searched in a picture, or the other way round")
+                .cause("a model of heights is searched in a picture, or the reverse")
                 .next("teach the model from a map of the same kind"));
         }
     }
@@ -340,8 +340,8 @@ fn finish(
     out.into_iter().map(|m| m.1).collect()
 }
 
-/// A candidate refined, with the score and the coverage there. Where cells are missing few edges hold a pose, and later rounds may
-/// walk along them onto a shadow's: then the round that scores best is taken.
+/// A candidate refined, with the score and the coverage there. Where cells are missing few edges hold a pose, and
+/// later rounds may walk along them onto a shadow's: then the round that scores best is taken.
 fn refined(
     layers: &[Directions],
     fields: &[(Kind, &Field, f32)],

@@ -1,5 +1,5 @@
-//! In: slope fields of one pyramid level; where a turned model's features look. Out: the level as the stages see it, and the
-//! peaks of the features' sums on the CPU (quantised and spread as in \[hinterstoisser12\]).
+//! In: slope fields of one pyramid level; where a turned model's features look. Out: the level as the stages see it,
+//! and the peaks of the features' sums on the CPU (quantised and spread as in \[hinterstoisser12\]).
 //! Frame and unit: cells of the level; scores are integers, 0 to 4 a feature.
 
 use crate::find::model::gradient::Field;

@@ -87,22 +87,22 @@ impl SearchOptions {
             return bad(format!("scales are {s0} to {s1}, wanted ascending within 0.2 to 5"));
         }
         if !(0.1..=1.0).contains(&self.min_score) {
-            return bad(format!("min_score is {}, wanted 0.1 to 1", self.min_score));
+            return bad(format!("min_score is {}; allowed: 0.1 to 1", self.min_score));
         }
         if !(1..=Self::MOST_MATCHES).contains(&self.max_matches) {
-            return bad(format!("max_matches is {}, wanted 1 to {}", self.max_matches, Self::MOST_MATCHES));
+            return bad(format!("max_matches is {}; allowed: 1 to {}", self.max_matches, Self::MOST_MATCHES));
         }
         if !(0.0..=1.0).contains(&self.max_overlap) {
-            return bad(format!("max_overlap is {}, wanted 0 to 1", self.max_overlap));
+            return bad(format!("max_overlap is {}; allowed: 0 to 1", self.max_overlap));
         }
         if self.min_contrast.is_some_and(|c| !(c > 0.0 && c.is_finite())) {
             return bad("min_contrast must be above 0".into());
         }
         if !(0.5..=1.0).contains(&self.ambiguous_at) {
-            return bad(format!("ambiguous_at is {}, wanted 0.5 to 1", self.ambiguous_at));
+            return bad(format!("ambiguous_at is {}; allowed: 0.5 to 1", self.ambiguous_at));
         }
         if !(8..=5000).contains(&self.candidates) {
-            return bad(format!("candidates is {}, wanted 8 to 5000", self.candidates));
+            return bad(format!("candidates is {}; allowed: 8 to 5000", self.candidates));
         }
         Ok(())
     }

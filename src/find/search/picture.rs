@@ -1,4 +1,5 @@
-//! In: a picture, the matches found in it, their model. Out: the picture for people with each match's edges, number and reference point.
+//! In: a picture, the matches found in it, their model. Out: the picture for people with each match's edges, number
+//! and reference point.
 //! Frame and unit: pixels of the picture.
 
 use super::full::Match;

@@ -80,8 +80,8 @@ pub fn refine(
             return None;
         }
         let (step, covariance, sigma) = solve(&rows, free)?;
-        // Edges were looked for within REACH: a longer step is an extrapolation along a motion that few of them hold, as where a
-        // shadow hides the edges across it. The next round looks from where this one could see.
+        // Edges were looked for within REACH: a longer step is an extrapolation along a motion that few of them hold,
+        // as where a shadow hides the edges across it. The next round looks from where this one could see.
         let longest = step.x.hypot(step.y) + model.radius * (step.z.abs() + step.w.abs());
         let step = step * (REACH as f64 / longest).min(1.0);
         pose.x += step.x;
@@ -178,8 +178,8 @@ mod tests {
     use crate::find::model::shape_model::ModelOptions;
     use crate::find::scene::Layer;
 
-    /// A plate whose upper and lower edges lie in shadow, half a cell narrower than drawn: its nearly parallel sides alone hold it
-    /// along them, and meet their edges 20 px away.
+    /// A plate whose upper and lower edges lie in shadow, half a cell narrower than drawn: its nearly parallel sides
+    /// alone hold it along them, and meet their edges 20 px away.
     #[test]
     fn a_step_is_never_longer_than_edges_were_looked_for() {
         let drawing =

@@ -56,7 +56,7 @@ fn stretched(bytes: &[u8]) -> Result<()> {
     };
     match most.and_then(|w| w.parse::<u32>().ok()) {
         Some(most) if ![1, 255, 65_535].contains(&most) => {
-            Err(Fault::input(format!("has {most} as its largest level (MAXVAL), wanted 255 or 65535"))
+            Err(Fault::input(format!("has {most} as its largest level (MAXVAL); allowed: 255 or 65535"))
                 .cause("colour pictures of other depths would be stretched")
                 .next("save it as PGM or as PNG"))
         }

@@ -1,4 +1,5 @@
-//! Reads PGM (P5 and P2) with its levels as they are written: other readers stretch a 12-bit sensor's levels to 16 bits.
+//! Reads PGM (P5 and P2) with its levels as they are written: other readers stretch a 12-bit sensor's levels to 16
+//! bits.
 
 use super::kind::{Kind, Values};
 use super::picture::{Samples, Wanted};

@@ -49,8 +49,8 @@ fn single(info: &Info) -> Result<()> {
     match info.animation_control {
         Some(control) if control.num_frames > 1 => {
             Err(Fault::input(format!("is an animation of {} pictures (acTL)", control.num_frames))
-                .cause("one picture is wanted, and which is not said")
-                .next("save the one that is meant as a PNG of its own"))
+                .cause("one picture is needed, and it is not stated which")
+                .next("save that picture as a separate PNG"))
         }
         _ => Ok(()),
     }

@@ -45,7 +45,7 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
         }
         _ => Err(Fault::input(format!("has {} masks (NewSubfileType, tag 254)", pages.masks.len()))
             .cause("masks of several pages or of reduced copies")
-            .next("save the page that is meant, with its mask, as a file of its own")),
+            .next("save that page with its mask as a separate file")),
     }
 }
 
@@ -88,8 +88,8 @@ fn page(bytes: &[u8], index: usize, wanted: &Wanted) -> Result<Samples> {
     Ok(samples.upright(orientation))
 }
 
-/// The `tiff` crate turns the samples of a picture whose white is 0 round, and reads no palettes and masks. It gets a copy
-/// of the file that says "black is 0", and gives the samples as they are written.
+/// The `tiff` crate turns the samples of a picture whose white is 0 round, and reads no palettes and masks. It gets a
+/// copy of the file that says "black is 0", and gives the samples as they are written.
 fn as_black_is_zero<'a>(bytes: &'a [u8], file: &mut Decoder<Cursor<&'a [u8]>>, tags: &Tags) -> Result<Cow<'a, [u8]>> {
     if tags.shades == Shades::Rgb || (tags.shades == Shades::Grey && !tags.says.white_is_zero) {
         return Ok(Cow::Borrowed(bytes));
@@ -98,7 +98,7 @@ fn as_black_is_zero<'a>(bytes: &'a [u8], file: &mut Decoder<Cursor<&'a [u8]>>, t
     let at = file.ifd_pointer().and_then(|p| usize::try_from(p.0).ok());
     let places = at
         .and_then(|at| value_of_tag(bytes, at, big_endian))
-        .ok_or_else(|| strange(&"its PhotometricInterpretation (tag 262) is no number of 16 bits"))?;
+        .ok_or_else(|| strange(&"its PhotometricInterpretation (tag 262) is not a number of 16 bits"))?;
     let mut copy = bytes.to_vec();
     for at in places {
         copy[at..at + 2].copy_from_slice(&if big_endian { 1u16.to_be_bytes() } else { 1u16.to_le_bytes() });

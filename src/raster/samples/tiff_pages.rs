@@ -49,7 +49,7 @@ impl Pages {
         let several = |what: String| {
             Err(Fault::input(what)
                 .cause("several pictures in one file; which of them is meant is not said")
-                .next("import-map takes --page N; elsewhere save the page that is meant as a file of its own"))
+                .next("import-map takes --page N; otherwise save that page as a separate file"))
         };
         match (&self.full[..], page) {
             (full, Some(page)) => match page.checked_sub(1).and_then(|k| full.get(k)) {
@@ -66,7 +66,6 @@ impl Pages {
     /// What was passed over, in words.
     pub fn note(&self, chosen: usize) -> Option<String> {
         let reduced = self.reduced.iter().filter(|k| **k != chosen).count();
-        (reduced > 0)
-            .then(|| format!("{reduced} reduced copies in the file were passed over (NewSubfileType, tag 254)"))
+        (reduced > 0).then(|| format!("{reduced} reduced copies in the file were skipped (NewSubfileType, tag 254)"))
     }
 }

@@ -48,7 +48,7 @@ fn number(file: &mut File, tag: Tag, otherwise: u16) -> Result<u16> {
     let found = file.find_tag_unsigned::<u16>(tag);
     found
         .map(|n| n.unwrap_or(otherwise))
-        .map_err(|e| refused(format!("has a tag {} that is no number: {e}", tag.to_u16())))
+        .map_err(|e| refused(format!("has a tag {} that is not a number: {e}", tag.to_u16())))
 }
 
 fn numbers(file: &mut File, tag: Tag) -> Vec<u16> {
@@ -94,7 +94,7 @@ pub(super) fn tags(file: &mut File) -> Result<Tags> {
                 "has {samples} samples a pixel where {colours} are meant (SamplesPerPixel, tag 277; ExtraSamples, 338)"
             ))
             .cause("several bands or measurements in one picture; which of them is meant is not said")
-            .next("save the band that is meant as a TIFF of its own"));
+            .next("save that band as a separate TIFF"));
         }
     };
     let bits = numbers(file, Tag::BitsPerSample).first().copied().unwrap_or(1);
@@ -112,12 +112,12 @@ pub(super) fn tags(file: &mut File) -> Result<Tags> {
     };
     let order = number(file, Tag::FillOrder, 1)?;
     if order != 1 {
-        return Err(refused(format!("has the bits of its bytes in order {order} (FillOrder, tag 266), wanted 1")));
+        return Err(refused(format!("has the bits of its bytes in order {order} (FillOrder, tag 266); allowed: 1")));
     }
     // 0 is what writers put that do not know.
     let orientation = number(file, Tag::Orientation, 1)?.max(1);
     if orientation > 8 {
-        return Err(refused(format!("has orientation {orientation} (tag 274), wanted 1 to 8")));
+        return Err(refused(format!("has orientation {orientation} (tag 274); allowed: 1 to 8")));
     }
     let palette = if shades == Shades::Palette { numbers(file, Tag::ColorMap) } else { vec![] };
     if shades == Shades::Palette && (!matches!(kind, Kind::Unsigned(1..=8)) || palette.len() != 3 << bits) {
@@ -137,7 +137,7 @@ fn says(file: &mut File, photometric: u16) -> Result<Says> {
     if let Some(text) = text(file, Tag::GdalNodata) {
         says.missing = Some(text.parse().map_err(|_| {
             Fault::input(format!(
-                "names '{text}' as the sample of a missing pixel (GDAL_NODATA, tag 42113), which is no number"
+                "names '{text}' as the sample of a missing pixel (GDAL_NODATA, tag 42113), which is not a number"
             ))
             .cause("a slip of the program that wrote the file")
             .next("correct the tag, or take it out")
@@ -194,7 +194,7 @@ fn scale_of_imagej(description: &str) -> Result<Option<[f64; 2]>> {
         None => Ok(None),
         Some("0") => line(value("c1"), value("c0")),
         Some(other) => {
-            Err(refused(format!("calibrates its samples by ImageJ's function {other}, wanted 0, a straight line"))
+            Err(refused(format!("calibrates its samples by ImageJ's function {other}; allowed: 0, a straight line"))
                 .next("in ImageJ apply the calibration and save the result as 32 bits"))
         }
     }

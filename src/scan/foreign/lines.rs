@@ -1,6 +1,6 @@
-//! Makes of a foreign file, and of what its user states about it, a cloud in lines, as if a scan had made a shot of each.
-//! Places are in the file's own frame, mm. A height picture's x runs along its columns, z towards the sensor, and y makes the
-//! frame right-handed: against the rows of a picture that is seen from the sensor.
+//! Makes of a foreign file, and of what its user states about it, a cloud in lines, as if a scan had made a shot of
+//! each. Places are in the file's own frame, mm. A height picture's x runs along its columns, z towards the sensor,
+//! and y makes the frame right-handed: against the rows of a picture that is seen from the sensor.
 
 use super::missing;
 use super::raw::Raw;
@@ -42,13 +42,17 @@ pub fn lines(raw: &Raw, light: Option<&Raw>, stated: &Stated) -> Result<Lines> {
             .next("give --unit-mm: mm in one level of a picture, or in one unit of a cloud (1 for mm, 1000 for m)")
     })?;
     if !UNITS_MM.contains(&unit) {
-        return Err(Fault::usage(format!("the unit is {unit} mm, wanted {} to {}", UNITS_MM.start(), UNITS_MM.end()))
-            .next("correct --unit-mm"));
+        return Err(Fault::usage(format!(
+            "the unit is {unit} mm; allowed: {} to {}",
+            UNITS_MM.start(),
+            UNITS_MM.end()
+        ))
+        .next("correct --unit-mm"));
     }
     if let Some(wrong) = stated.spacing_mm.iter().flatten().find(|v| !UNITS_MM.contains(v)) {
         let (least, most) = (UNITS_MM.start(), UNITS_MM.end());
         return Err(
-            Fault::usage(format!("a spacing of {wrong:e} mm, wanted {least} to {most}")).next("correct --spacing-mm")
+            Fault::usage(format!("a spacing of {wrong:e} mm; allowed: {least} to {most}")).next("correct --spacing-mm")
         );
     }
     if !(stated.offset_mm.abs() <= FARTHEST_MM) || stated.sigma_mm.is_some_and(|s| !(s > 0.0 && s < 100.0)) {
@@ -101,7 +105,7 @@ fn for_pictures_only(light: Option<&Raw>, stated: &Stated) -> Result<()> {
         () => return Ok(()),
     };
     Err(Fault::usage(format!("{option} is of a picture of heights, the file is a cloud"))
-        .cause("the points of a cloud say where they lie, and bring their own light")
+        .cause("the points of a cloud carry their own coordinates and intensity")
         .next(format!("leave {option} out")))
 }
 

@@ -143,9 +143,9 @@ fn viewed(words: &[&str]) -> Result<()> {
     let none = numbers.iter().all(|v| *v == 0.0);
     match numbers[..] {
         [x, y, z, w, i, j, k] if [x, y, z, i, j, k] == [0.0; 6] && (w.abs() == 1.0 || none) => Ok(()),
-        _ => Err(Fault::input(format!("says that its sensor stood at VIEWPOINT {}", words.join(" ")))
-            .cause("some programs move the points there, others do not; which is meant is not said")
-            .next("move the points as they are meant and write the cloud with VIEWPOINT 0 0 0 1 0 0 0")),
+        _ => Err(Fault::input(format!("states the sensor's pose VIEWPOINT {}", words.join(" ")))
+            .cause("some programs move the points there, others do not, and the file does not state which")
+            .next("move the points and write the cloud with VIEWPOINT 0 0 0 1 0 0 0")),
     }
 }
 
@@ -165,8 +165,8 @@ fn number(kind: char, size: usize) -> Option<Number> {
     })
 }
 
-/// LZF: a control byte below 32 is followed by one byte more than it says as they are; others repeat what was written before:
-/// length in the upper three bits (7: another byte adds to it), distance in the lower five and the byte after.
+/// LZF: a control byte below 32 is followed by one byte more than it says as they are; others repeat what was written
+/// before: length in the upper three bits (7: another byte adds to it), distance in the lower five and the byte after.
 fn unpack(packed: &[u8], length: usize) -> Option<Vec<u8>> {
     let mut out = Vec::with_capacity(length.min(packed.len().saturating_mul(264)));
     let mut bytes = packed.iter().map(|&b| usize::from(b));

@@ -8,7 +8,7 @@ pub(super) fn read(bytes: &[u8], page: Option<usize>) -> Result<Raw> {
     let wanted = Wanted { size: None, most: MOST_POINTS as u64, page };
     let samples = read_samples(bytes, &wanted)?;
     if samples.says.lossy {
-        return Err(Fault::input("is compressed as JPEG: its levels are no longer those that were measured")
+        return Err(Fault::input("is compressed as JPEG: its levels differ from the measured ones")
             .cause("a picture of the heights for people")
             .next("export the heights as TIFF or PNG of 16 bits, or as float TIFF"));
     }
@@ -18,7 +18,7 @@ pub(super) fn read(bytes: &[u8], page: Option<usize>) -> Result<Raw> {
             .next("give the picture whose levels are measured"));
     }
     if !samples.grey() {
-        return Err(Fault::input("is a picture in colour; one number a pixel is wanted")
+        return Err(Fault::input("is a colour picture; one number per pixel is needed")
             .cause("false colours of a viewer, a palette, or numbers packed into red, green and blue")
             .next("export the numbers themselves as one grey channel: TIFF or PNG of 16 bits, or float TIFF"));
     }

@@ -3,7 +3,8 @@
 /// What no file says for certain, and nobody guesses.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stated {
-    /// Columns and rows of a height picture are so far apart, mm; points of a cloud without lines are taken as so far apart.
+    /// Columns and rows of a height picture are so far apart, mm; points of a cloud without lines are taken as so far
+    /// apart.
     pub spacing_mm: Option<[f64; 2]>,
     /// mm in one level of a height picture, or in one unit of a cloud's coordinates.
     pub unit_mm: Option<f64>,

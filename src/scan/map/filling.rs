@@ -1,4 +1,5 @@
-//! In: points, twice in any order. Out: the cells of a height map, filled by the grid stages on a GPU or by their twins.
+//! In: points, twice in any order. Out: the cells of a height map, filled by the grid stages on a GPU or by their
+//! twins.
 //! Frame and unit: grid frame; whole steps until the means, then mm and grey levels.
 
 use crate::fault::{Fault, Result};

@@ -1,5 +1,5 @@
-//! In: a height map, filters in their order. Out: the same map without the cells that they take away. A filter takes away and never makes
-//! up: what stays is as it was measured.
+//! In: a height map, filters in their order. Out: the same map without the cells that they take away. A filter takes
+//! away and never makes up: what stays is as it was measured.
 //! Frame and unit: grid frame, mm from the grid's corner; heights above the grid's plane.
 
 use super::heightmap::HeightMap;
@@ -92,7 +92,8 @@ impl Filter {
     }
 }
 
-/// `sigma:0.05`, `heights:-1,4`, `cut:10,10,20,20`, `keep:0,0,50,30`, `islands:20,0.5`: lengths in mm, islands in cells first.
+/// `sigma:0.05`, `heights:-1,4`, `cut:10,10,20,20`, `keep:0,0,50,30`, `islands:20,0.5`: lengths in mm, islands in
+/// cells first.
 impl std::str::FromStr for Filter {
     type Err = String;
 
@@ -109,7 +110,8 @@ impl std::str::FromStr for Filter {
             }
             _ => {
                 return Err(format!(
-                    "'{text}' is no filter: sigma:MM, heights:LOW,HIGH, cut:X0,Y0,X1,Y1, keep:X0,Y0,X1,Y1 or islands:CELLS,STEP"
+                    "'{text}' is not a filter: sigma:MM, heights:LOW,HIGH, cut:X0,Y0,X1,Y1, keep:X0,Y0,X1,Y1 or \
+                     islands:CELLS,STEP"
                 ));
             }
         };
@@ -124,7 +126,8 @@ fn inside(map: &HeightMap, c: &[f64; 4]) -> Vec<bool> {
     (0..map.height).flat_map(|y| columns.iter().map(move |x| *x && within(y, c[1], c[3]))).collect()
 }
 
-/// Which cells belong to a piece of fewer than so many: pieces of neighbours, also across corners, that differ by no more than a step.
+/// Which cells belong to a piece of fewer than so many: pieces of neighbours, also across corners, that differ by no
+/// more than a step.
 fn small(map: &HeightMap, least: usize, step: f32) -> Vec<bool> {
     let (w, h) = (map.width as usize, map.height as usize);
     let (mut seen, mut goes) = (vec![false; map.z.len()], vec![false; map.z.len()]);
@@ -161,7 +164,8 @@ mod tests {
     use super::*;
     use crate::geometry::Rigid;
 
-    /// A slope that rises by 0.1 a cell, a block of 10 x 10 cells 5 mm above it, 3 glints and a pair of cells off in the air.
+    /// A slope that rises by 0.1 a cell, a block of 10 x 10 cells 5 mm above it, 3 glints and a pair of cells off in
+    /// the air.
     fn map() -> HeightMap {
         let mut map = HeightMap::empty(60, 40, 0.5, Rigid::identity());
         for i in 0..map.z.len() {

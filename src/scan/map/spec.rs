@@ -18,8 +18,8 @@ pub struct GridOptions {
     pub base_from_grid: Option<Rigid<Base, Grid>>,
     /// Cells [x, y]; by default what the points need.
     pub cells: Option<[u32; 2]>,
-    /// Points farther apart than this in one cell belong to two surfaces, mm, 0.0001..=100; by default the rise of a slope
-    /// of 31 degrees over a cell, and not less than six of the points' own standard deviations.
+    /// Points farther apart than this in one cell belong to two surfaces, mm, 0.0001..=100; by default the rise of a
+    /// slope of 31 degrees over a cell, and not less than six of the points' own standard deviations.
     #[serde(rename = "layer_mm")]
     pub layer: Option<f64>,
     /// Points of less quality are left out, 0..=1.
@@ -211,8 +211,8 @@ pub fn extents(points: &[Vec3]) -> [(f64, f64); 3] {
 }
 
 /// The scan's best plane: the one with most points near it (seeded consensus over 400 triples), then least squares over
-/// its points. x is the base's x laid into the plane, z points `up`. Near is six of the points' own standard deviations,
-/// and where those are small a five-hundredth of the scan's size: boards and tables are flat to that.
+/// its points. x is the base's x laid into the plane, z points `up`. Near is six of the points' own standard
+/// deviations, and where those are small a five-hundredth of the scan's size: boards and tables are flat to that.
 pub fn best_frame(sample: &Sample, up: &Vec3) -> Result<Rigid<Base, Grid>> {
     let points = &sample.points;
     let size = extents(points).iter().map(|(a, b)| b - a).fold(0.0, f64::max);

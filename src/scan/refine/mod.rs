@@ -1,5 +1,5 @@
-//! In: a whole scan's cloud, where the camera was reported at its shots. Out: the same without what the lines of the cloud show to be wrong
-//! with each other: places that scatter, light that brightness pulls.
+//! In: a whole scan's cloud, where the camera was reported at its shots. Out: the same without what the lines of the
+//! cloud show to be wrong with each other: places that scatter, light that brightness pulls.
 //! Frame and unit: the cloud's frame, mm.
 
 mod path;

@@ -1,13 +1,14 @@
-//! In: pairs of what was expected and what was seen, from comparisons of each line of a cloud with the lines before and after it. Out: how
-//! many times the expected was seen, whatever steps and edges of the part lie in some of the pairs.
+//! In: pairs of what was expected and what was seen, from comparisons of each line of a cloud with the lines before
+//! and after it. Out: how many times the expected was seen, whatever steps and edges of the part lie in some of the
+//! pairs.
 //! Frame and unit: the caller's; docs/math.md, Places that scatter (5).
 
 use crate::solve::robust_scale;
 
 /// A slope is believed from so many of its standard deviations on.
 const SURE: f64 = 4.0;
-/// Neighbouring comparisons share two of three shots, and those of a line their shot: the slope's standard deviation is so many times that
-/// of as many comparisons that know nothing of each other.
+/// Neighbouring comparisons share two of three shots, and those of a line their shot: the slope's standard deviation
+/// is so many times that of as many comparisons that know nothing of each other.
 const SHARED: f64 = 2.0;
 /// Where the weight of a comparison has gone to nothing, in deviations: Tukey's biweight.
 const FAR: f64 = 4.7;

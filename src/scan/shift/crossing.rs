@@ -21,7 +21,8 @@ pub struct Crossing {
 const FAINTEST: f64 = 30.0;
 /// Noise of a grey level on a flank, for the sigma: photographs are compressed and speckled.
 const NOISE: f64 = 5.0;
-/// Half width of the window whose light tells the stripe from glow: a glow is wide and faint, a stripe narrow and bright, px.
+/// Half width of the window whose light tells the stripe from glow: a glow is wide and faint, a stripe narrow and
+/// bright, px.
 const CORE: usize = 2;
 
 /// The stripe of each row: of the skeleton's places the one with most light in a narrow window, refined to the middle
@@ -97,7 +98,8 @@ fn flanks(row: &[f32], mut x: usize, background: f64, full: f64) -> Option<(Cros
 mod tests {
     use super::*;
 
-    /// A saturated stripe with a wide, lopsided glow, as a red channel shows it, and a faint broad reflection beside it.
+    /// A saturated stripe with a wide, lopsided glow, as a red channel shows it, and a faint broad reflection beside
+    /// it.
     #[test]
     fn neither_glow_nor_reflection_moves_the_middle() {
         for (sigma, glow, reflection) in [(1.6, 0.0, 0.0), (1.6, 90.0, 0.0), (2.5, 120.0, 80.0), (4.0, 60.0, 100.0)] {

@@ -87,16 +87,16 @@ impl ShiftRig {
     }
 }
 
-/// Where the stripe would lie on the bed: a line through the bed rows, and how far the stripe of the empty bed lies beside
-/// such a line.
+/// Where the stripe would lie on the bed: a line through the bed rows, and how far the stripe of the empty bed lies
+/// beside such a line.
 #[derive(Clone, Debug, Default)]
 struct Zero {
     beside: Vec<f64>,
 }
 
 impl Zero {
-    /// From pictures of the empty bed, which show how the lens and the laser bend the stripe: the median of each row. A row
-    /// that fewer than half of them show lies as its neighbours do.
+    /// From pictures of the empty bed, which show how the lens and the laser bend the stripe: the median of each row.
+    /// A row that fewer than half of them show lies as its neighbours do.
     fn of(pictures: &[Vec<Option<Crossing>>], rig: &ShiftRig) -> Option<Zero> {
         let lines: Vec<_> = pictures.iter().filter_map(|p| Some((p, bed_line(p, rig)?))).collect();
         let rows = lines.first()?.0.len();
@@ -149,7 +149,8 @@ fn points(rows: &[Option<Crossing>], shot: u32, rig: &ShiftRig, zero: &Zero) -> 
     found().map(point).filter(|p| p.position[2].is_finite()).collect()
 }
 
-/// u = a + b v by the median of slopes and of offsets (Theil 1950; docs/math.md, Shift); half of the points may be wrong.
+/// u = a + b v by the median of slopes and of offsets (Theil 1950; docs/math.md, Shift); half of the points may be
+/// wrong.
 fn robust_line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     if points.len() < 10 {
         return None;
@@ -212,8 +213,8 @@ pub fn shift_scan(
                 folder.display(),
                 empty.len()
             ))
-            .cause("no stripe there, or pictures of another set-up")
-            .next("give pictures of the empty bed, taken as the others, or leave --reference out")
+            .cause("no stripe there, or pictures of another setup")
+            .next("give pictures of the empty bed, taken like the others, or omit --reference")
         })?,
     };
     let mut report = ShiftReport {

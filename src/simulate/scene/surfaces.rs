@@ -1,5 +1,5 @@
-//! In: a scene file's content, or a board. Out: what rays hit and with which material, and how far a measured point is from the
-//! nearest surface.
+//! In: a scene file's content, or a board. Out: what rays hit and with which material, and how far a measured point
+//! is from the nearest surface.
 //! Frame and unit: scene frame, z up, mm.
 
 use super::spec::{FARTHEST, Material, PartSpec, SceneSpec, SolidSpec};
@@ -147,7 +147,8 @@ impl Scene {
         self.bodies.iter().map(|b| b.body.distance(&b.to_body(p))).fold(f64::INFINITY, f64::min)
     }
 
-    /// The same with a calibration board that lies in it: `rotation` and `at` take the board's coordinates to the scene's.
+    /// The same with a calibration board that lies in it: `rotation` and `at` take the board's coordinates to the
+    /// scene's.
     ///
     /// # Errors
     /// As [`Scene::of_board`].

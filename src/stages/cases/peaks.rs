@@ -1,5 +1,5 @@
-//! In: the scenes with a stripe; straight stripes of every width, direction and depth. Out: the cases of the stages after the
-//! skeleton. Frame and unit: pixels, words.
+//! In: the scenes with a stripe; straight stripes of every width, direction and depth. Out: the cases of the stages
+//! after the skeleton. Frame and unit: pixels, words.
 
 use super::scenes::{Scene, drawn, optics, pose, tilted};
 use super::walk::Walk;
@@ -34,8 +34,8 @@ pub fn peaks(stage: &str) -> Vec<Case> {
 
 /// Profile sigmas, px: every number of quads and of rows a sample.
 const WIDTHS: [f64; 8] = [0.8, 1.0, 1.5, 2.0, 2.5, 3.3, 5.0, 9.0];
-/// A few degrees off the image axes, so that the skeleton comes by every place within a word. The angle of the stripe, then
-/// that of a stripe on a level surface: a wall stands upright where the rig's stripe lies.
+/// A few degrees off the image axes, so that the skeleton comes by every place within a word. The angle of the
+/// stripe, then that of a stripe on a level surface: a wall stands upright where the rig's stripe lies.
 const DIRECTIONS: [(&str, f64, f32); 4] =
     [("lying", 4.0, 0.0), ("upright", 86.0, 90.0), ("at 45 degrees", 45.0, 45.0), ("a wall", 86.0, 0.0)];
 const DEPTHS: [u8; 4] = [8, 10, 12, 16];

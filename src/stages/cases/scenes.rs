@@ -61,8 +61,8 @@ pub fn drawn(width: u32, height: u32, bits: u8, mut f: impl FnMut(u32, u32) -> u
     image(width, height, bits, px)
 }
 
-/// Faint noise with one brighter pixel in every other tile of every other row of tiles, on the picture's border where the
-/// tile has one, some of them two, and each as bright as the threshold or one level beside it.
+/// Faint noise with one brighter pixel in every other tile of every other row of tiles, on the picture's border where
+/// the tile has one, some of them two, and each as bright as the threshold or one level beside it.
 fn specks(width: u32, height: u32, bits: u8) -> Image {
     let mut noise = Noise(31);
     let grey = |level: u32| level << (bits - 8);

@@ -1,4 +1,5 @@
-//! In: a scene. Out: the chain on the twins, by the table that the GPU's recording reads; the cases of each of its stages.
+//! In: a scene. Out: the chain on the twins, by the table that the GPU's recording reads; the cases of each of its
+//! stages.
 //! Frame and unit: words of the stages' bindings.
 
 use super::scenes::{Scene, scenes};

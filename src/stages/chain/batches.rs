@@ -197,7 +197,8 @@ impl<T> Chain<T> {
         self.submit_posed(tag, images, &[])
     }
 
-    /// As `submit`, with the shots' poses ([`crate::stages::stripe::point::pose_words`]), which a chain that measures needs.
+    /// As `submit`, with the shots' poses ([`crate::stages::stripe::point::pose_words`]), which a chain that measures
+    /// needs.
     pub fn submit_posed(&mut self, tag: T, images: &[&Image], poses: &[[f32; 12]]) -> Result<()> {
         assert!(self.poses.is_none() || poses.len() == images.len(), "one pose a picture");
         assert!((1..=self.frame.shots as usize).contains(&images.len()), "1 to {} pictures a batch", self.frame.shots);
@@ -230,8 +231,8 @@ impl<T> Chain<T> {
         self.run(at, true, sections)
     }
 
-    /// As `submit_posed` with the pictures and poses that lie in the next place since it was last filled: work without an
-    /// upload, to measure what the device does by itself. The ambient light is not subtracted a second time.
+    /// As `submit_posed` with the pictures and poses that lie in the next place since it was last filled: work
+    /// without an upload, to measure what the device does by itself. The ambient light is not subtracted a second time.
     pub fn submit_again(&mut self, tag: T, shots: u32) -> Result<()> {
         let sections = self.sections();
         let at = self.ring.keep(InFlight { tag, shots, sections })?;
@@ -317,7 +318,8 @@ impl<T> Chain<T> {
     }
 }
 
-/// Rows of a picture that are written at a time, and the bytes of all such parts of the input; the last one holds the poses.
+/// Rows of a picture that are written at a time, and the bytes of all such parts of the input; the last one holds the
+/// poses.
 fn parts(f: &Frame, input: u64) -> (u32, Vec<usize>) {
     let row = 4 * f.pitch as usize;
     let band = (PART / row).clamp(1, f.height as usize);

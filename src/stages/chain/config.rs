@@ -29,7 +29,8 @@ pub struct ChainConfig {
     pub region: Option<Mask>,
     /// Subtracted from every picture.
     pub ambient: Option<Image>,
-    /// How far the ends of lines are carried on ([`crate::stages::stripe::lengthen::LengthenParams::word`]); 0 is not at all.
+    /// How far the ends of lines are carried on ([`crate::stages::stripe::lengthen::LengthenParams::word`]); 0 is not
+    /// at all.
     pub lengthen: u32,
     /// One fit a crossing of a wide stripe ([`crate::stages::stripe::spacing::word`]), none of what has no company
     /// ([`crate::stages::stripe::spacing::COMPANY`]); 0 is one for every skeleton pixel.
@@ -60,8 +61,9 @@ impl ChainConfig {
             timed: false,
         }
     }
-    /// With the batch that hides the fixed cost on this device: one with memory of its own has more processors to keep busy, and
-    /// a dispatch of any size takes it as long as 400,000 pixels. All three batches need less than a gigabyte.
+    /// With the batch that hides the fixed cost on this device: one with memory of its own has more processors to
+    /// keep busy, and a dispatch of any size takes it as long as 400,000 pixels. All three batches need less than a
+    /// gigabyte.
     pub fn on(self, device: &Device) -> ChainConfig {
         if !device.info.unified_memory {
             return ChainConfig { shots: shots_for(self.width, self.height, 40_000_000, 64), ..self };

@@ -1,5 +1,5 @@
-//! In: the point list of a batch, the settings of peaks and their choice, the rig, the shots' poses. Out: dispatches that
-//! turn it into chosen peaks and points. Frame and unit: pixels and grey levels; points in the poses' frame, mm.
+//! In: the point list of a batch, the settings of peaks and their choice, the rig, the shots' poses. Out: dispatches
+//! that turn it into chosen peaks and points. Frame and unit: pixels and grey levels; points in the poses' frame, mm.
 
 use super::measure::Measure;
 use super::part::{Part, whole};

@@ -1,5 +1,5 @@
-//! In: the layout of a batch. Out: the chain as one table: its buffers, and its steps in order. Recording, the walk on the
-//! twins and the tests read it; nothing else knows the order. Reasons: docs/math.md, Stripe stages.
+//! In: the layout of a batch. Out: the chain as one table: its buffers, and its steps in order. Recording, the walk
+//! on the twins and the tests read it; nothing else knows the order. Reasons: docs/math.md, Stripe stages.
 //! Frame and unit: words of 32 bits.
 
 use crate::stages::Thinning;
@@ -13,9 +13,9 @@ pub const FRAME: &str = "frame";
 
 /// Sub-iterations in one round of thinning; a stripe 50 px wide takes 52. Wider ones go further rounds.
 pub const ROUND: u32 = 56;
-/// Sub-iterations before which the tile list is shortened: the ends of the sections of a round. The first time soon: most tiles of a noisy picture hold specks
-/// that never change. Then at most 8 apart: what a change can travel in them stays within the neighbouring tiles,
-/// which are 8 px high.
+/// Sub-iterations before which the tile list is shortened: the ends of the sections of a round. The first time soon:
+/// most tiles of a noisy picture hold specks that never change. Then at most 8 apart: what a change can travel in
+/// them stays within the neighbouring tiles, which are 8 px high.
 const SHORTEN: [u32; 8] = [2, 8, 16, 24, 32, 40, 48, ROUND];
 
 /// Buffers that all batches use one after the other, and their words.

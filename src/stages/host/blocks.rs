@@ -1,5 +1,5 @@
-//! In: a band of a picture. Out: which blocks of 8 x 8 pixels may hold a lit pixel, and the least sum that a window around any of
-//! their pixels can come to; all others are proven dark.
+//! In: a band of a picture. Out: which blocks of 8 x 8 pixels may hold a lit pixel, and the least sum that a window
+//! around any of their pixels can come to; all others are proven dark.
 //! Frame and unit: blocks of pixels, four of them a tile; 256ths of full scale. docs/math.md, Stripe stages.
 
 use super::sample::{EDGE, FOUR, Four, Sample};
@@ -19,7 +19,8 @@ struct Row {
     column: Vec<u16>,
 }
 
-/// Rows of blocks of a band of a picture, with `margin` rows and columns around them; beyond the picture its border repeats.
+/// Rows of blocks of a band of a picture, with `margin` rows and columns around them; beyond the picture its border
+/// repeats.
 #[derive(Clone, Default)]
 pub struct Blocks {
     rows: Vec<Row>,
@@ -211,7 +212,8 @@ fn bound(blocks: &Blocks, f: &Frame, y: usize, out: &mut Proof) {
     }
 }
 
-/// Where even the block's largest pixel does not pass against that bound, none of its pixels passes against its true mean.
+/// Where even the block's largest pixel does not pass against that bound, none of its pixels passes against its true
+/// mean.
 #[multiversion(targets = "simd")]
 fn passing(f: &Frame, largest: &[u16], out: &mut Proof) {
     let deep = depth_shift(f);

@@ -1,5 +1,5 @@
-//! In: a picture, what a row of tiles may hold. Out: the lit pixels of that row of tiles, by exact window means, looked for
-//! only where they were not ruled out.
+//! In: a picture, what a row of tiles may hold. Out: the lit pixels of that row of tiles, by exact window means,
+//! looked for only where they were not ruled out.
 //! Frame and unit: pixels, tiles of 32 x 8 as eight words; grey levels of the picture's depth.
 
 use super::blocks::{Proof, level};
@@ -14,8 +14,8 @@ use std::ops::{AddAssign, SubAssign};
 pub type Tile = [u32; 8];
 /// Pixels of a tile's row.
 const WIDE: usize = 32;
-/// Pixels in question of a tile up to which each window is added up by itself. Beyond that the tile's columns are added up
-/// once for all.
+/// Pixels in question of a tile up to which each window is added up by itself. Beyond that the tile's columns are
+/// added up once for all.
 const FEW: u32 = 6;
 /// Tiles beside each other that are added up together.
 const MOST: usize = 16;
@@ -122,8 +122,8 @@ fn bits(of: impl Fn(usize) -> bool) -> u32 {
     (0..WIDE).fold(0, |word, i| word | u32::from(of(i)) << i)
 }
 
-/// Tiles with few pixels in question: each window by itself, or, where that is less work, the columns of the whole picture from row to
-/// row by what enters and what leaves.
+/// Tiles with few pixels in question: each window by itself, or, where that is less work, the columns of the whole
+/// picture from row to row by what enters and what leaves.
 fn few<T: Sample>(v: View<T>, ty: usize, s: &mut Sums<T::Wide>, out: &mut [Tile]) {
     let (height, rows) = (v.f.size as usize, (v.f.height as usize - EDGE * ty).min(EDGE));
     let pixels: u32 = s.few.iter().flat_map(|(_, question)| question).map(|w| w.count_ones()).sum();
@@ -208,8 +208,8 @@ fn exchange<T: Sample>(enters: &[T], leaves: &[T], columns: &mut [T::Wide]) {
     }
 }
 
-/// The sum of the window around a pixel: its columns first, which for a row is one addition of all. `columns` is memory that is
-/// used again: what lies on the stack is taken apart into single numbers.
+/// The sum of the window around a pixel: its columns first, which for a row is one addition of all. `columns` is
+/// memory that is used again: what lies on the stack is taken apart into single numbers.
 #[multiversion(targets = "simd")]
 fn window<T: Sample>(v: View<T>, x: usize, y: usize, columns: &mut Vec<T::Wide>) -> u32 {
     let (w, r) = (v.f.width as usize, (v.f.size / 2) as usize);
@@ -241,7 +241,8 @@ fn settle<T: Sample>(v: View<T>, ty: usize, run: std::ops::Range<usize>, sums: &
     }
 }
 
-/// Column sums of all rows of the window, from row to row by what enters and what leaves; then the sums of the window's columns.
+/// Column sums of all rows of the window, from row to row by what enters and what leaves; then the sums of the
+/// window's columns.
 #[multiversion(targets = "simd")]
 fn mean<T: Sample>(v: View<T>, ty: usize, run: std::ops::Range<usize>, s: &mut Sums<T::Wide>, out: &mut [Tile]) {
     let (w, h, r) = (v.f.width as usize, v.f.height as usize, (v.f.size / 2) as isize);

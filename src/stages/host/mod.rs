@@ -1,5 +1,6 @@
-//! In: pictures, one at a time. Out: their skeleton pixels, peaks and points, from the processor of this machine, in the
-//! order and by the proofs of the GPU's chain: statistics of every pixel, then only the tiles that may hold a lit one.
+//! In: pictures, one at a time. Out: their skeleton pixels, peaks and points, from the processor of this machine, in
+//! the order and by the proofs of the GPU's chain: statistics of every pixel, then only the tiles that may hold a lit
+//! one.
 //! Frame and unit: pixels; points in the poses' frame, mm.
 
 use super::chain::config::ChainConfig;
@@ -28,8 +29,8 @@ use sample::Sample;
 use std::sync::Mutex;
 use thinning::{Tiles, Worn};
 
-/// The chain for one kind of picture. Shared among threads, each of which works on a picture of its own; a large picture
-/// is divided among those that are free.
+/// The chain for one kind of picture. Shared among threads, each of which works on a picture of its own; a large
+/// picture is divided among those that are free.
 pub struct Host {
     frame: Frame,
     threshold: ThresholdParams,

@@ -1,4 +1,5 @@
-//! In: grey levels of 8 bits or of 9 to 16. Out: the numbers that their sums are held in, what the proof needs of four blocks.
+//! In: grey levels of 8 bits or of 9 to 16. Out: the numbers that their sums are held in, what the proof needs of
+//! four blocks.
 //! Frame and unit: grey levels.
 
 use std::ops::{AddAssign, SubAssign};
@@ -46,8 +47,8 @@ impl Sample for u8 {
     }
     #[inline(always)]
     fn four(lines: &[&[u8]; EDGE], from: usize) -> Four {
-        // The eight pixels of a block's row are one word: every other byte of it, summed by themselves, are the columns' sums, and
-        // bytes added up two, four and eight together the row's.
+        // The eight pixels of a block's row are one word: every other byte of it, summed by themselves, are the
+        // columns' sums, and bytes added up two, four and eight together the row's.
         const EVERY_OTHER: u64 = 0x00ff_00ff_00ff_00ff;
         let (mut even, mut odd, mut row) = ([0u64; FOUR], [0u64; FOUR], [u32::MAX; FOUR]);
         let (mut largest, mut smallest) = ([0u8; 32], [u8::MAX; 32]);

@@ -1,5 +1,5 @@
-//! In: the scenes of the stage tests and random pictures, sizes and settings. Out: the chain on this machine's processor
-//! gives the masks and skeletons of the plain twins, pixel for pixel, and their peaks and points.
+//! In: the scenes of the stage tests and random pictures, sizes and settings. Out: the chain on this machine's
+//! processor gives the masks and skeletons of the plain twins, pixel for pixel, and their peaks and points.
 //! Frame and unit: pixels.
 
 use super::*;
@@ -130,13 +130,14 @@ fn masks_and_skeletons_of_random_pictures_are_those_of_the_twins() {
     }
 }
 
-/// Rows of a band are worked out as they are needed, over those of the picture before: none of that may be taken for this one's.
+/// Rows of a band are worked out as they are needed, over those of the picture before: none of that may be taken for
+/// this one's.
 #[test]
 fn what_a_picture_left_behind_says_nothing_of_the_next() {
     let (w, h) = (320, 700);
     let bright = drawn(w, h, 8, |x, y| 230 + (x * 31 + y * 17) % 9);
-    // Bright above and dark below, another edge every 40 rows, and beneath each a faint line: there a window is darkest at
-    // its lower end, which is what is worked out last.
+    // Bright above and dark below, another edge every 40 rows, and beneath each a faint line: there a window is
+    // darkest at its lower end, which is what is worked out last.
     let edges = |shift: u32| {
         drawn(w, h, 8, move |x, y| match (y + shift) % 40 {
             0..20 => 120 + (x * 31 + y * 17) % 3,

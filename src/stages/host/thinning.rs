@@ -1,5 +1,6 @@
 //! In: the lit tiles of a picture. Out: the same thinned to lines one pixel wide, nothing left to delete.
-//! Frame and unit: tiles of 32 x 8 pixels as eight words, with a border of dark ones. The rule is that of the stage `thin`.
+//! Frame and unit: tiles of 32 x 8 pixels as eight words, with a border of dark ones. The rule is that of the stage
+//! `thin`.
 
 use super::light::Tile;
 use crate::stages::Thinning;
@@ -49,8 +50,8 @@ impl Tiles {
             self.words[at][r] & (one ^ two) & !more
         })
     }
-    /// Pixels of a tile with no other one above or below them within the distance of a spacing's setting; none are told of settings
-    /// that look along rows or beyond the tiles beside it.
+    /// Pixels of a tile with no other one above or below them within the distance of a spacing's setting; none are
+    /// told of settings that look along rows or beyond the tiles beside it.
     #[inline(always)]
     pub fn alone(&self, at: usize, spacing: u32) -> Tile {
         if spacing == 0 || spacing > 8 {
@@ -67,7 +68,8 @@ impl Tiles {
     #[inline(always)]
     pub fn in_company(&self, at: usize, near: usize) -> Tile {
         let columns = [at - 1, at, at + 1].map(|at| [at - self.stride, at, at + self.stride].map(|at| self.words[at]));
-        // Of the rows of the tile and of those above and below it, 8 each: whether a pixel beside a place is set, or it too.
+        // Of the rows of the tile and of those above and below it, 8 each: whether a pixel beside a place is set, or
+        // it too.
         let beside: [u32; 24] = std::array::from_fn(|r| {
             let [west, own, east] = columns.map(|rows| rows[r / 8][r % 8]);
             (1..=near).fold(0, |near, d| near | own << d | west >> (32 - d) | own >> d | east << (32 - d))

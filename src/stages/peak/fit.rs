@@ -1,4 +1,5 @@
-//! In: pictures, skeleton pixels, the expected stripe. Out: the level beside it; peaks by the maximum-likelihood Gaussian across.
+//! In: pictures, skeleton pixels, the expected stripe. Out: the level beside it; peaks by the maximum-likelihood
+//! Gaussian across.
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (2) to (5).
 
 use super::PeakFrame;
@@ -12,13 +13,14 @@ use super::scoring;
 
 /// Nearer than so many pixels lies a narrow stripe's own light, more on the side that its centre is nearer to.
 pub(in crate::stages) const BESIDE: i32 = 4;
-/// Variances of a pixel by as many pixels a side: what two sides of one level differ by, squared, is twice that on average, and hardly
-/// ever four times as much.
+/// Variances of a pixel by as many pixels a side: what two sides of one level differ by, squared, is twice that on
+/// average, and hardly ever four times as much.
 pub(in crate::stages) const BY_NOISE: f32 = 8.0;
 
-/// Level beside the stripe, 4 to 6 widths out: the darker side, because a second stripe lights one side only. On three lines
-/// 1.2 widths apart: a level with the noise of three pixels would be the largest error of a profile averaged over many. And by how
-/// much, squared, the sides differ beyond their noise: within the stripe nobody knows which of the two it is.
+/// Level beside the stripe, 4 to 6 widths out: the darker side, because a second stripe lights one side only. On
+/// three lines 1.2 widths apart: a level with the noise of three pixels would be the largest error of a profile
+/// averaged over many. And by how much, squared, the sides differ beyond their noise: within the stripe nobody knows
+/// which of the two it is.
 #[inline(always)]
 pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s: &PeakFrame) -> (f32, f32) {
     let from = (4.0 * s.s0 + 0.5).floor() as i32;

@@ -1,5 +1,5 @@
-//! In: the pictures' layout, the settings of peaks and their choice. Out: the uniform block of the stages lines and peak,
-//! every size worked out once. Frame and unit: pixels, grey levels of the picture's depth.
+//! In: the pictures' layout, the settings of peaks and their choice. Out: the uniform block of the stages lines and
+//! peak, every size worked out once. Frame and unit: pixels, grey levels of the picture's depth.
 
 use super::across::turn::{FLAT, turn};
 use super::params::{PeakParams, SAMPLES};
@@ -71,7 +71,8 @@ pub struct PeakFrame {
     pub entries: u32,
     /// Columns or rows of a line, about a stripe's width: what is strongest within five widths needs no finer lines.
     pub line_px: u32,
-    /// Groups of four columns that a profile is added up from; 0 where the stripe is so narrow that each goes by itself.
+    /// Groups of four columns that a profile is added up from; 0 where the stripe is so narrow that each goes by
+    /// itself.
     pub fours: i32,
     /// Half of a profile that stands upright, samples.
     pub half_across: f32,
@@ -94,7 +95,8 @@ pub struct PeakFrame {
 }
 
 /// WGSL name, members and bytes of [`PeakFrame`], for the contract tests.
-pub const UNIFORM: (&str, &[Field], usize) = crate::stages::frame::uniform_fields!(PeakFrame: width, height, pitch, shot_words, s0, full_scale,
+pub const UNIFORM: (&str, &[Field], usize) = crate::stages::frame::uniform_fields!(PeakFrame: width, height, pitch,
+    shot_words, s0, full_scale,
     read2, gain, speckle2, belief, along_factor, reach_along, lattice_u, lattice_v, stride, steps, faintest, narrowest,
     widest, uncertain, upright, across_u, across_v, lines, columns, entries,
     line_px, fours, half_across,
@@ -102,8 +104,8 @@ pub const UNIFORM: (&str, &[Field], usize) = crate::stages::frame::uniform_field
 
 impl PeakFrame {
     /// Quads of samples of a profile, which the shader has written out: -2 quads up to 2 quads - 1, so that the shorter
-    /// side still has all of an upright profile. They hold all of it on lines up to 31 degrees off an image axis; beyond
-    /// that the outermost flanks are left out, at 45 degrees those from 2.5 widths on.
+    /// side still has all of an upright profile. They hold all of it on lines up to 31 degrees off an image axis;
+    /// beyond that the outermost flanks are left out, at 45 degrees those from 2.5 widths on.
     pub fn quads(&self) -> i32 {
         let upright = self.half_across.ceil() + 1.0;
         ((0.5 * (self.half_across / 0.86).max(upright)).ceil() as i32).clamp(1, SAMPLES as i32 / 4)
@@ -126,16 +128,17 @@ impl PeakFrame {
         let line_px = s0.floor().max(1.0);
         let lines = (if columns { width } else { height }).div_ceil(line_px as u32);
         let reach_along = if p.along > 0.0 { radius.floor() as i32 } else { 0 };
-        // Differences over nearly three widths: noise and speckle turn the direction least, and a Gaussian has little left
-        // between samples that far apart. Along a stripe that lies as it should there is room for half as much again.
+        // Differences over nearly three widths: noise and speckle turn the direction least, and a Gaussian has little
+        // left between samples that far apart. Along a stripe that lies as it should there is room for half as much
+        // again.
         let (lattice_across, lattice_along) = ((1.4 * s0).round().max(1.0) as i32, (2.1 * s0).round().max(2.0) as i32);
         let lattice = if columns { (lattice_along, lattice_across) } else { (lattice_across, lattice_along) };
         // What is seen as flat may stand three degrees steeper.
         let [turn_2, turn_4, turn_6, turn_8] = turn(s0, lattice, [2.0, 4.0, 6.0, 8.0], FLAT + 0.05, !columns);
         let square = (lattice_across, lattice_across);
         let [square_4, square_8] = turn(s0, square, [4.0, 8.0], std::f64::consts::FRAC_PI_4, false);
-        // Rows within 0.4 widths are one sample: their spread is known and costs little of sigma. More than two leave so few samples
-        // that their scatter says little of the noise.
+        // Rows within 0.4 widths are one sample: their spread is known and costs little of sigma. More than two leave
+        // so few samples that their scatter says little of the noise.
         let rows = (0.4 * s0).floor().clamp(1.0, 2.0);
         PeakFrame {
             width: width as i32,
@@ -168,8 +171,8 @@ impl PeakFrame {
             columns: u32::from(columns),
             entries: lines * shots,
             line_px: line_px as u32,
-            // Groups start at multiples of four, so that the window is up to two pixels off: five sixths of it, which hold
-            // 99 % of the weight, shall be there on the shorter side as well.
+            // Groups start at multiples of four, so that the window is up to two pixels off: five sixths of it, which
+            // hold 99 % of the weight, shall be there on the shorter side as well.
             fours: if reach_along >= 4 { (0.415 * radius + 1.5) as i32 } else { 0 },
             // The fit looks at three widths; the skeleton is a pixel beside the centre.
             half_across: (4.0 * s0).min(3.0 * s0 + 1.0) / rows,

@@ -1,4 +1,5 @@
-//! In: numbers of eight fits that run side by side. Out: arithmetic on all of them at once, each rounded as if it were alone.
+//! In: numbers of eight fits that run side by side. Out: arithmetic on all of them at once, each rounded as if it
+//! were alone.
 //! Frame and unit: none.
 
 use std::array::from_fn;

@@ -1,4 +1,5 @@
-//! In: a picture with a stripe and its skeleton. Out: the stripe's width, its speckle contrast and the sensor's noise, from the light itself.
+//! In: a picture with a stripe and its skeleton. Out: the stripe's width, its speckle contrast and the sensor's
+//! noise, from the light itself.
 //! Frame and unit: Gaussian sigma in px; speckle is a ratio. docs/math.md, Stripe peak (6).
 
 use super::found::Peak;
@@ -19,8 +20,9 @@ const FEWEST: usize = 20;
 /// Pairs of pixels that are looked at where grains correlate them, over all windows.
 const PAIRS: usize = 1_000_000;
 
-/// Width, speckle and noise of the stripe in one picture, and the dark pixels' noise as it was assumed; `None` where there is too little of it.
-/// `across` is the unit image direction of depth. Start: half the pixels above half maximum. Then three rounds of fitting with the medians of the round before.
+/// Width, speckle and noise of the stripe in one picture, and the dark pixels' noise as it was assumed; `None` where
+/// there is too little of it. `across` is the unit image direction of depth. Start: half the pixels above half
+/// maximum. Then three rounds of fitting with the medians of the round before.
 pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams, across: Vec2) -> Option<Stripe> {
     let step = (skeleton.len() / SAMPLES).max(1);
     let sample: Vec<(i32, i32)> =
@@ -93,8 +95,9 @@ fn fits<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame) -> Vec<Fit> {
     peaks.filter_map(|(peak, &at)| Some(Fit { at, sums: residuals(image, at, &peak, s, &mut pixels)?, peak })).collect()
 }
 
-/// Fits whose residuals are noise. Where a stripe falls over an edge two pieces of it lie in one window, and on parts with many small
-/// faces such windows are the greater number: what they leave grows with the light as speckle does. A quarter shows what is usual.
+/// Fits whose residuals are noise. Where a stripe falls over an edge two pieces of it lie in one window, and on parts
+/// with many small faces such windows are the greater number: what they leave grows with the light as speckle does. A
+/// quarter shows what is usual.
 fn of_one_surface(mut fits: Vec<Fit>, grain: f32) -> Vec<Fit> {
     fits.sort_by(|a, b| a.sums.misfit().total_cmp(&b.sums.misfit()));
     let usual = fits[fits.len() / 4].sums.misfit();
@@ -113,7 +116,8 @@ struct Pixel {
     cell: Cell,
 }
 
-/// The window's pixels, and what the fit's three numbers scatter by: pixel by pixel the share of the noise that is left is 1 - leverage.
+/// The window's pixels, and what the fit's three numbers scatter by: pixel by pixel the share of the noise that is
+/// left is 1 - leverage.
 fn pixels<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame, all: &mut Vec<Pixel>) -> Option<Matrix3<f32>> {
     let n = (k.normal_u, k.normal_v);
     let m = middle(at, k);
@@ -148,7 +152,8 @@ fn residuals<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame, all: &m
 }
 
 impl Fit {
-    /// The same squared residuals where the speckle has grains, of which a fit takes more; the centre's variance over that without them.
+    /// The same squared residuals where the speckle has grains, of which a fit takes more; the centre's variance over
+    /// that without them.
     fn with_grains<G: Grey>(&mut self, image: G, s: &PeakFrame, grain: f32, all: &mut Vec<Pixel>) -> Option<f32> {
         let inverse = pixels(image, self.at, &self.peak, s, all)?;
         let stride = grain::stride(grain);
@@ -170,8 +175,9 @@ fn middle((x, y): (i32, i32), k: &Peak) -> f32 {
     (k.u - x as f32) * k.normal_u + (k.v - y as f32) * k.normal_v
 }
 
-/// The centres of the columns (or rows) along a peak's line, from its model's, and their variance without the speckle's. The light fades
-/// out of what is added up: at a sharp end each pixel that comes in or leaves would move the centre.
+/// The centres of the columns (or rows) along a peak's line, from its model's, and their variance without the
+/// speckle's. The light fades out of what is added up: at a sharp end each pixel that comes in or leaves would move
+/// the centre.
 fn grains<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame) -> Grains {
     let (n, m) = ((k.normal_u, k.normal_v), middle(at, k));
     let reach = Grains::reach(s.reach_along);
@@ -190,8 +196,8 @@ fn grains<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame) -> Grains 
     Grains::new(&columns.iter().map(|c| (c.1 / c.0, c.2 / (c.0 * c.0))).collect::<Vec<_>>())
 }
 
-/// The pixels that take part: `reach` columns (or rows) along the stripe to both sides, in each those within three widths of the line.
-/// `visit` gets column and row from the skeleton pixel, offset across, offset along, grey level.
+/// The pixels that take part: `reach` columns (or rows) along the stripe to both sides, in each those within three
+/// widths of the line. `visit` gets column and row from the skeleton pixel, offset across, offset along, grey level.
 #[inline(always)]
 fn window<G: Grey>(
     image: G,
@@ -238,8 +244,8 @@ fn half_maximum(image: &Image, sample: &[(i32, i32)]) -> Option<f32> {
     (widths.len() >= FEWEST).then(|| median(widths) / 2.355)
 }
 
-/// Half of the light that was fitted is in peaks narrower than this. Where the sheet runs along an edge, the most peaks of a shot can be of
-/// light that falls over it: narrower than the stripe, and less than all of its light.
+/// Half of the light that was fitted is in peaks narrower than this. Where the sheet runs along an edge, the most
+/// peaks of a shot can be of light that falls over it: narrower than the stripe, and less than all of its light.
 fn width_of_most_light(fits: &[Fit]) -> f32 {
     let mut fits: Vec<(f32, f32)> =
         fits.iter().map(|f| (f.peak.width_px, f.peak.amplitude * f.peak.width_px)).collect();
@@ -267,8 +273,8 @@ mod tests {
     const WIDE: f64 = 3.0;
     const SPECKLE: f64 = 0.08;
 
-    /// A quarter of a picture's stripe lies on a face, the rest of it runs along an edge: nine tenths of the light fall over, and what
-    /// stays is a sliver (half as wide as the stripe, a fifth as bright).
+    /// A quarter of a picture's stripe lies on a face, the rest of it runs along an edge: nine tenths of the light
+    /// fall over, and what stays is a sliver (half as wide as the stripe, a fifth as bright).
     #[test]
     fn slivers_of_light_along_an_edge_are_not_the_stripe() {
         let mut noise = Noise(7);
@@ -289,7 +295,8 @@ mod tests {
         assert!((f64::from(found.speckle) / SPECKLE - 1.0).abs() < 0.15, "{found:?}");
     }
 
-    /// A stripe that falls over an edge every `face` px, and its middle. Every `print` px it is half as bright, over 2 px.
+    /// A stripe that falls over an edge every `face` px, and its middle. Every `print` px it is half as bright, over
+    /// 2 px.
     fn falling(face: u32, print: f64) -> (Image, Vec<u32>) {
         let mut noise = Noise(5);
         let middle = |x: u32| 60.0 + [0.0, 7.0, 3.0, 12.0][(x / face) as usize % 4];

@@ -1,4 +1,5 @@
-//! In: a picture, a skeleton pixel, the expected stripe. Out: peaks by centre of gravity, by derivatives, and without either.
+//! In: a picture, a skeleton pixel, the expected stripe. Out: peaks by centre of gravity, by derivatives, and without
+//! either.
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels.
 
 use super::PeakFrame;
@@ -108,7 +109,8 @@ fn derivative<G: Grey>(image: G, m0: f32, Seen { at: (x, y), n, base, .. }: Seen
     finish(cx, cy, n, m, top.max(1.0), base, width, noise.sqrt() / (-d2).max(1e-6), saturated, s)
 }
 
-/// A pixel's position where nothing says in which part of it the centre lies: the standard deviation of an even distribution.
+/// A pixel's position where nothing says in which part of it the centre lies: the standard deviation of an even
+/// distribution.
 pub(in crate::stages) const EVEN: f32 = 0.288_675_13;
 
 /// The pixel itself, on a stripe that lies as it should and is as wide as expected.

@@ -36,7 +36,8 @@ pub struct PeakParams {
     /// Speckle contrast of one pixel, 0..=1: standard deviation over mean of coherent light. 0 is a stripe without
     /// speckle; larger trusts the flanks more and the top less.
     pub speckle: f32,
-    /// How much more a centre scatters by speckle of large grains than by one of single pixels, 1..=20; measured on the first shots.
+    /// How much more a centre scatters by speckle of large grains than by one of single pixels, 1..=20; measured on
+    /// the first shots.
     #[serde(skip, default = "one")]
     pub grain: f32,
     /// Read and quantisation noise, 0.1..=20 grey levels of an 8-bit picture.
@@ -108,7 +109,8 @@ pub struct Stripe {
     /// Sigma of the blur that makes the speckle's grains, px; 0 where each pixel's speckle is its own.
     #[serde(default)]
     pub grain_px: f32,
-    /// How much more a centre scatters by such speckle than by one of single pixels; 1 where it is one of single pixels.
+    /// How much more a centre scatters by such speckle than by one of single pixels; 1 where it is one of single
+    /// pixels.
     #[serde(default = "one")]
     pub grain_factor: f32,
     /// Standard deviation of a dark pixel, grey levels of an 8-bit picture; 0 where nothing is known of it.

@@ -1,4 +1,5 @@
-//! In: pictures, skeleton pixels, the directions across the stripe. Out: the stripe's profiles there, averaged along it, side by side.
+//! In: pictures, skeleton pixels, the directions across the stripe. Out: the stripe's profiles there, averaged along
+//! it, side by side.
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (2).
 
 use super::PeakFrame;
@@ -10,10 +11,10 @@ use super::params::SAMPLES;
 /// multiplications.
 const WEIGHT: f32 = 127.0;
 
-/// The stripe's light over the offset across, one profile a lane, which know nothing of each other: sample k at `offset + k step`,
-/// k = -half..half. Pixels beside each other along the stripe are added up along an image axis, a wide stripe's columns in groups of
-/// four, each shifted by whole pixels to follow the line; what the shifts leave, and the rows of a sample, widens the profile by
-/// `blur2`, which is known.
+/// The stripe's light over the offset across, one profile a lane, which know nothing of each other: sample k at
+/// `offset + k step`, k = -half..half. Pixels beside each other along the stripe are added up along an image axis, a
+/// wide stripe's columns in groups of four, each shifted by whole pixels to follow the line; what the shifts leave,
+/// and the rows of a sample, widens the profile by `blur2`, which is known.
 pub(super) struct Profiles {
     /// Grey levels, from the middle to both sides, as the shader walks: k = 0, 1, .. and k = -1, -2, ..
     pub levels: [[Lanes; SAMPLES / 2]; 2],
@@ -53,9 +54,10 @@ pub(super) fn by_columns((nx, ny): (f32, f32)) -> bool {
     1.001 * ny >= nx.abs()
 }
 
-/// How far a window may reach to both sides along a: no farther than the picture on one of them, as an error of the direction would move the
-/// centre of a window that reaches farther to one side; and no farther than the shifted columns hold the skeleton's pixel, without whose sample
-/// a profile has no crest. At whole numbers rounding shall not decide.
+/// How far a window may reach to both sides along a: no farther than the picture on one of them, as an error of the
+/// direction would move the centre of a window that reaches farther to one side; and no farther than the shifted
+/// columns hold the skeleton's pixel, without whose sample a profile has no crest. At whole numbers rounding shall
+/// not decide.
 #[inline(always)]
 fn room((a0, b0): (i32, i32), (na, nb): (f32, f32), (width, height): (i32, i32)) -> i32 {
     let across = b0.min(height - 1 - b0) as f32 * nb.abs() / na.abs().max(1e-6);

@@ -1,4 +1,5 @@
-//! In: stripe profiles side by side, one a lane. Out: the Gaussian of each by maximum likelihood: centre, amplitude, width, sigma.
+//! In: stripe profiles side by side, one a lane. Out: the Gaussian of each by maximum likelihood: centre, amplitude,
+//! width, sigma.
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (3) to (5).
 
 use super::PeakFrame;
@@ -7,10 +8,11 @@ use super::profile::{Profiles, clipped_within, number, share};
 
 /// Grey levels that are no light, but whose square is no denormal number: those take a CPU many times as long.
 pub(in crate::stages) const DARK: f32 = 1e-9;
-/// Share of a number's information that is left at least where another number explains it: what f32 can tell from nothing.
+/// Share of a number's information that is left at least where another number explains it: what f32 can tell from
+/// nothing.
 pub(in crate::stages) const LEAST: f32 = 1e-5;
-/// Share of the amplitude that sides of different levels are doubted by at most: what differs more is another stripe's light, and its
-/// side is not believed anyhow.
+/// Share of the amplitude that sides of different levels are doubted by at most: what differs more is another
+/// stripe's light, and its side is not believed anyhow.
 pub(in crate::stages) const UNEVEN: f32 = 0.06;
 /// Share of the ceiling over which clipped pixels fall silent: at once, and rounding would decide.
 pub(in crate::stages) const SOFT: f32 = 0.05;
@@ -41,8 +43,8 @@ struct Gaussian {
     believed: Lanes,
 }
 
-/// Certainty times model squared times z^0, z^1, .. z^4; certainty times residual times model times z^0, z^1, z^2; the squared
-/// residuals, and the weights that were heard.
+/// Certainty times model squared times z^0, z^1, .. z^4; certainty times residual times model times z^0, z^1, z^2;
+/// the squared residuals, and the weights that were heard.
 struct Sums {
     e: [Lanes; 5],
     r: [Lanes; 3],
@@ -58,8 +60,8 @@ struct Scoring<'a> {
     /// The first guess of the centre; the width that is expected of the profile.
     m0: Lanes,
     s0: Lanes,
-    /// Variance of a pixel: `quiet` + `gain` light + `speckle2` light^2. What the level beside the stripe may be off by is noise too:
-    /// on a flank, whose speckle is faint, it would count as light.
+    /// Variance of a pixel: `quiet` + `gain` light + `speckle2` light^2. What the level beside the stripe may be off
+    /// by is noise too: on a flank, whose speckle is faint, it would count as light.
     quiet: Lanes,
     gain: Lanes,
     speckle2: f32,
@@ -70,8 +72,8 @@ struct Scoring<'a> {
     prior: Lanes,
 }
 
-/// Fisher scoring of amplitude, offset and width in the first `lanes` lanes. Variance of a pixel: read noise + gain · level +
-/// speckle² · light². A saturated pixel says only "at least this bright".
+/// Fisher scoring of amplitude, offset and width in the first `lanes` lanes. Variance of a pixel: read noise + gain ·
+/// level + speckle² · light². A saturated pixel says only "at least this bright".
 #[inline(always)]
 pub(super) fn gaussians(profiles: &Profiles, lanes: usize, s: &PeakFrame) -> Found {
     let (m0, a0) = profiles.guess(s);
@@ -127,8 +129,8 @@ impl Scoring<'_> {
         let (h00, h01, h02, h11, h12) = (e[0] + tiny, e[1], e[2], e[2] + tiny, e[3]);
         let h22 = e[4] + prior * (w * w);
         let (g0, g1, g2) = (r[0], r[1], r[2] + (prior * w) * (s0 - w));
-        // Amplitude, then width are eliminated, the centre comes last: d1 is what the light says of it alone. Where it says
-        // nothing, as of a stripe that is clipped all over, rounding shall not make up a certainty.
+        // Amplitude, then width are eliminated, the centre comes last: d1 is what the light says of it alone. Where
+        // it says nothing, as of a stripe that is clipped all over, rounding shall not make up a certainty.
         let (l01, l02) = (h01 / h00, h02 / h00);
         let d2 = (h22 - l02 * h02).max(LEAST * h22);
         let s12 = h12 - l02 * h01;
@@ -153,8 +155,8 @@ impl Scoring<'_> {
             believed: count / self.profiles.weight,
         };
         fit.take(&next, runs);
-        // The next step would be a tenth of this one, of few fits a half: far below what noise leaves, and below what a GPU and a processor
-        // may differ by where one of them takes it.
+        // The next step would be a tenth of this one, of few fits a half: far below what noise leaves, and below what
+        // a GPU and a processor may differ by where one of them takes it.
         for (lane, runs) in runs.iter_mut().enumerate() {
             let [da, dm, dw] = [da, dm, dw].map(|d| d.0[lane].abs());
             let s0 = s0.0[lane];
@@ -179,8 +181,8 @@ impl Scoring<'_> {
         }
     }
 
-    /// From the middle to one side, because what has become 0 stays 0. A Gaussian at equal steps: its ratio from sample to sample
-    /// falls by a constant factor.
+    /// From the middle to one side, because what has become 0 stays 0. A Gaussian at equal steps: its ratio from
+    /// sample to sample falls by a constant factor.
     #[inline(always)]
     fn side(&self, side: usize, a: Lanes, (mut z, dz): (Lanes, Lanes), fall: Lanes) -> Sums {
         let p = self.profiles;

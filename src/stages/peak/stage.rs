@@ -1,4 +1,5 @@
-//! In: the bindings of the peak stage as words. Out: the same bindings with the peaks and the strongest filled in, by the CPU twin.
+//! In: the bindings of the peak stage as words. Out: the same bindings with the peaks and the strongest filled in, by
+//! the CPU twin.
 //! Frame and unit: words; peaks in pixels and grey levels.
 
 use super::found::Peak;
@@ -108,10 +109,11 @@ pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     peaks[..words.len()].copy_from_slice(words);
 }
 
-/// Largest difference of two lists of peaks, in units of what is allowed for each number: position 0.01 px or a hundredth
-/// of its own sigma (what the light does not determine, rounding decides), width 1 %, stated sigma 2 %, amplitude and
-/// background 0.5 % or a hundredth of a grey level, the strongest amplitudes alike; everything else exact. Where a number is so
-/// near to a limit that only one of the two is refused, each has to have the reason that its own number gives.
+/// Largest difference of two lists of peaks, in units of what is allowed for each number: position 0.01 px or a
+/// hundredth of its own sigma (what the light does not determine, rounding decides), width 1 %, stated sigma 2 %,
+/// amplitude and background 0.5 % or a hundredth of a grey level, the strongest amplitudes alike; everything else
+/// exact. Where a number is so near to a limit that only one of the two is refused, each has to have the reason that
+/// its own number gives.
 pub fn apart(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
     let frame = frame_of(gpu);
     let (a, b): (&[Peak], &[Peak]) = (bytemuck::cast_slice(&gpu[4]), bytemuck::cast_slice(&twin[4]));

@@ -70,8 +70,9 @@ mod tests {
     use super::*;
     use crate::stages::cases::stripe;
 
-    /// What lies in the lanes beside a profile, and what lay there before, is nothing to it: places all over a stripe, at the picture's
-    /// borders too, wide and narrow ones, each alone and with its seven neighbours of the list.
+    /// What lies in the lanes beside a profile, and what lay there before, is nothing to it: places all over a
+    /// stripe, at the picture's borders too, wide and narrow ones, each alone and with its seven neighbours of the
+    /// list.
     #[test]
     fn a_profile_among_others_comes_to_the_bits_that_it_comes_to_alone() {
         for (width, method) in [0.8, 2.5, 7.0].into_iter().flat_map(|w| Method::ALL.map(|m| (w, m))) {

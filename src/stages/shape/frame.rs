@@ -1,9 +1,10 @@
-//! In: the size of a pyramid level and of a model. Out: the layout that the stages of the coarse shape search share, and
-//! their test cases. Frame and unit: cells of the level, x right, y down; strided places are 4 cells apart.
+//! In: the size of a pyramid level and of a model. Out: the layout that the stages of the coarse shape search share,
+//! and their test cases. Frame and unit: cells of the level, x right, y down; strided places are 4 cells apart.
 
 pub(crate) const SHARED: &str = include_str!("../../../shaders/shared/shape.wgsl");
 /// WGSL name, members and bytes of [`ShapeFrame`], for the contract tests.
-pub const UNIFORM: (&str, &[crate::gpu::Field], usize) = crate::stages::frame::uniform_fields!(ShapeFrame: width, height, margin,
+pub const UNIFORM: (&str, &[crate::gpu::Field], usize) = crate::stages::frame::uniform_fields!(ShapeFrame: width,
+    height, margin,
     columns, rows, words, first, ignore, features, least, turns, capacity);
 
 /// Directions over a full turn.

@@ -1,5 +1,5 @@
-//! In: slopes of a pyramid level in whole numbers. Out: directions, and how well every strided place meets each of 16 of
-//! them, as WGSL stages with their CPU twins (docs/math.md, Shape matching, coarse search).
+//! In: slopes of a pyramid level in whole numbers. Out: directions, and how well every strided place meets each of 16
+//! of them, as WGSL stages with their CPU twins (docs/math.md, Shape matching, coarse search).
 //! Frame and unit: cells of the level, x right, y down; slopes in 1 / 64 of the threshold; responses 0 to 4.
 
 use super::frame::{BINS, SHARED, STRIDE, ShapeFrame, UNIFORM};

@@ -1,5 +1,5 @@
-//! In: responses of a level and the features of a model at many turns. Out: sums at every strided place and their peaks,
-//! as WGSL stages with their CPU twins (docs/math.md, Shape matching, coarse search).
+//! In: responses of a level and the features of a model at many turns. Out: sums at every strided place and their
+//! peaks, as WGSL stages with their CPU twins (docs/math.md, Shape matching, coarse search).
 //! Frame and unit: strided places; a perfect feature scores 4.
 
 use super::frame::{SHARED, ShapeFrame, UNIFORM};

@@ -97,8 +97,8 @@ impl<'a> Blocks<'a> {
         Band { sum, half_quad: 2 * band.smallest, ..band }
     }
 
-    /// Lower bound on the sum of every window whose centre lies in the block: windows hold the blocks near it whole, and
-    /// of those further away a part.
+    /// Lower bound on the sum of every window whose centre lies in the block: windows hold the blocks near it whole,
+    /// and of those further away a part.
     pub fn least_sum(&self, x: i32, y: i32) -> u32 {
         let (across, down) = (Cover::new(self.size, 16), Cover::new(self.size, 8));
         // What is covered in part in both directions holds, on both sides together, this many whole quads.

@@ -1,5 +1,6 @@
-//! In: the peaks of one shot. Out: the same peaks, those not believed marked with the reason. On the GPU the stages peak and
-//! point do it. Frame and unit: image pixels; grey levels of the picture's depth; widths relative to the stripe's.
+//! In: the peaks of one shot. Out: the same peaks, those not believed marked with the reason. On the GPU the stages
+//! peak and point do it. Frame and unit: image pixels; grey levels of the picture's depth; widths relative to the
+//! stripe's.
 
 use super::choose_params::ChooseParams;
 use crate::gpu::Access::*;
@@ -51,8 +52,8 @@ fn line_of(pixel: u32, columns: u32, line_px: u32) -> usize {
     ((if columns != 0 { pixel & 0xffff } else { pixel >> 16 }) / line_px) as usize
 }
 
-/// The tests that need no other peak; who passes them counts among the strongest of the lines of its shot. Amplitudes are
-/// positive, so their bits are in the order of their values.
+/// The tests that need no other peak; who passes them counts among the strongest of the lines of its shot. Amplitudes
+/// are positive, so their bits are in the order of their values.
 pub(in crate::stages) fn alone(k: &mut Peak, f: &PeakFrame, strongest: &mut [u32]) {
     k.refuse(reason(k, f));
     if k.kept() {

@@ -9,8 +9,9 @@ use crate::fault::{Fault, Result};
 pub struct ChooseParams {
     /// Least amplitude, 0..=255 grey levels of an 8-bit picture; below about ten times the read noise specks survive.
     pub faintest: f32,
-    /// Least profile sigma over the stripe's, 0..=1. A hot pixel has 0.4; a face that is tilted towards the laser, or along the sheet, 0.6 to
-    /// 0.8 where the sheet is wider than the lens's blur (docs/decisions/0020-narrow-stripes.md).
+    /// Least profile sigma over the stripe's, 0..=1. A hot pixel has 0.4; a face that is tilted towards the laser, or
+    /// along the sheet, 0.6 to 0.8 where the sheet is wider than the lens's blur
+    /// (docs/decisions/0020-narrow-stripes.md).
     pub narrowest: f32,
     /// Largest profile sigma over the stripe's, 1..=3. Two stripes that run together have 1.5 and more.
     pub widest: f32,

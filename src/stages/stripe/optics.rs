@@ -1,4 +1,5 @@
-//! In: camera, laser plane, lines across the stripe. Out: them in f32 as the stage that makes points uses them, and its uniform block.
+//! In: camera, laser plane, lines across the stripe. Out: them in f32 as the stage that makes points uses them, and
+//! its uniform block.
 //! Frame and unit: camera frame, px, mm; each field says.
 
 use super::choose::Lines;

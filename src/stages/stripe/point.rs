@@ -1,5 +1,5 @@
-//! In: chosen peaks, the camera, the laser plane, the shot's pose. Out: points with their standard deviation. The stage also
-//! makes the last choice: peaks that are weak beside another.
+//! In: chosen peaks, the camera, the laser plane, the shot's pose. Out: points with their standard deviation. The
+//! stage also makes the last choice: peaks that are weak beside another.
 //! Frame and unit: the frame that the given transform leads to (base or grid), mm. docs/math.md, Stripe peak (7), (8).
 
 use super::choose::{LINE_OF, beside};
@@ -82,8 +82,8 @@ pub fn camera_point(k: &Peak, o: &Optics) -> Option<(Vec3, f32)> {
     Some((Vec3::new(x * z, y * z, z), per_px * k.sigma_px))
 }
 
-/// A place on the sensor and a small move there, undone by Newton's method: the ray and how it moves; `None` beyond the picture
-/// of a lens that folds over.
+/// A place on the sensor and a small move there, undone by Newton's method: the ray and how it moves; `None` beyond
+/// the picture of a lens that folds over.
 pub fn undistort([xv, yv, du, dv]: [f32; 4], o: &Optics) -> Option<(f32, f32, f32, f32)> {
     let [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4] = o.distortion;
     let full = !o.plain();
@@ -145,8 +145,10 @@ pub const STAGE: Stage = Stage {
         Binding { name: "peaks", access: ReadWrite },
         Binding { name: "points", access: ReadWrite },
     ],
-    uniform: crate::stages::frame::uniform_fields!(PointFrame: fx, fy, cx, cy, skew, k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, t0, t1, t2, t3, t4, t5, t6, t7, t8,
-        normal_x, normal_y, normal_z, offset, none, lines, columns, line_px, echo_reach, echo, cut_width, cut_amplitude, reserved_1, reserved_2),
+    uniform: crate::stages::frame::uniform_fields!(PointFrame: fx, fy, cx, cy, skew, k1, k2, p1, p2, k3, k4, k5, k6,
+        s1, s2, s3, s4, t0, t1, t2, t3, t4, t5, t6, t7, t8,
+        normal_x, normal_y, normal_z, offset, none, lines, columns, line_px, echo_reach, echo, cut_width,
+            cut_amplitude, reserved_1, reserved_2),
     overrides: &[FULL_LENS],
 };
 
@@ -171,8 +173,8 @@ pub(crate) fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-/// Largest difference of two lists of points in units of 1 um, sigma in units of 1 %; flags exact. Points leave the same
-/// f32 steps on both sides, and no sum is longer than five terms: a few ulps of 500 mm (0.03 um) through a fused
+/// Largest difference of two lists of points in units of 1 um, sigma in units of 1 %; flags exact. Points leave the
+/// same f32 steps on both sides, and no sum is longer than five terms: a few ulps of 500 mm (0.03 um) through a fused
 /// multiply-add here and there.
 pub fn apart(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
     if gpu[4] != twin[4] {
@@ -214,7 +216,8 @@ mod tests {
         }
     }
 
-    /// Lenses and sensors of all kinds, up to 15 % of barrel and 15 degrees of tilt, each over the whole of its picture.
+    /// Lenses and sensors of all kinds, up to 15 % of barrel and 15 degrees of tilt, each over the whole of its
+    /// picture.
     fn lenses() -> Vec<Intrinsics> {
         let of = |fx: f64, terms: [f64; 14]| Intrinsics { fx, fy: fx, distortion: Distortion(terms), ..camera() };
         let mut all = vec![
@@ -243,7 +246,8 @@ mod tests {
                     let here = Vec2::new(f64::from(d.x as f32), f64::from(d.y as f32));
                     let exact = back(here);
                     let error_px = (Vec2::new(f64::from(x), f64::from(y)) - exact).norm() * camera.fx;
-                    // f32 holds a ray of 0.5 to 3e-8, which is 2e-5 px at 611 px; a few roundings may add up, and the tilt's.
+                    // f32 holds a ray of 0.5 to 3e-8, which is 2e-5 px at 611 px; a few roundings may add up, and the
+                    // tilt's.
                     let roundings = if optics.plain() { 6e-5 } else { 1.2e-4 };
                     assert!(error_px < 1e-6 + roundings * camera.fx / 611.6, "lens {i} at ({u}, {v}): {error_px}");
                     let move_ = back(here + Vec2::new(1e-6, 2e-6)) - exact;

@@ -28,8 +28,8 @@ pub struct Profile<T = ()> {
     pub peaks: Vec<Peak>,
     /// One a peak, base frame, mm; not a number where the peak was refused.
     pub points: Vec<Point>,
-    /// Places of the light, the same of every shot, base frame: two shots are as far apart as the farthest of them moves.
-    /// Where the laser plane meets the optical axis; on a turntable the stripe's ends too.
+    /// Places of the light, the same of every shot, base frame: two shots are as far apart as the farthest of them
+    /// moves. Where the laser plane meets the optical axis; on a turntable the stripe's ends too.
     pub anchors: [Vec3; 3],
     /// Distance of neighbouring points along the stripe at the anchor, mm.
     pub pitch: f32,
@@ -59,8 +59,9 @@ pub struct Support<T = ()> {
 }
 
 impl<T> Support<T> {
-    /// `axis`: unit vector along the laser line, base frame; `width_px`: the stripe's Gaussian sigma; `field_mm`: what the
-    /// picture's longer side sees where the sheet meets the optical axis. Without a device the twin judges, with the same result.
+    /// `axis`: unit vector along the laser line, base frame; `width_px`: the stripe's Gaussian sigma; `field_mm`:
+    /// what the picture's longer side sees where the sheet meets the optical axis. Without a device the twin judges,
+    /// with the same result.
     pub fn new(
         params: SupportParams,
         width_px: f32,

@@ -24,7 +24,8 @@ pub const STAGE: Stage = Stage {
         Binding { name: "peaks", access: Read },
         Binding { name: "flags", access: ReadWrite },
     ],
-    uniform: crate::stages::frame::uniform_fields!(SupportFrame: peaks, sure, right_low, right_high, haze, reserved_0, reserved_1,
+    uniform: crate::stages::frame::uniform_fields!(SupportFrame: peaks, sure, right_low, right_high, haze,
+        reserved_0, reserved_1,
         reserved_2),
     overrides: &[],
 };
@@ -133,8 +134,9 @@ pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-/// Wavy shots with strays, doubtful and hazy peaks, refused ones; shots close together, and ones a hand apart; a lattice
-/// whose diagonals are just within reach, and one whose diagonals are the reach: 0.25, 0.1875 and 0.3125 mm are whole.
+/// Wavy shots with strays, doubtful and hazy peaks, refused ones; shots close together, and ones a hand apart; a
+/// lattice whose diagonals are just within reach, and one whose diagonals are the reach: 0.25, 0.1875 and 0.3125 mm
+/// are whole.
 pub fn cases() -> Vec<Case> {
     let exact = (0.3125f64.powi(2) - 1.44 * 0.1875f64.powi(2)).sqrt() as f32;
     [

@@ -5,8 +5,8 @@ use super::rows::{Batch, BatchRow};
 use crate::fault::Result;
 use std::path::Path;
 
-const COLUMNS: &str = "recording,scan,points,median_sigma_mm,coverage,seconds,passed,score,x_mm,y_mm,z_mm,sigma_x_mm,sigma_y_mm,\
-                       sigma_z_mm,sigma_rx_deg,sigma_ry_deg,sigma_rz_deg,insertion,problem";
+const COLUMNS: &str = "recording,scan,points,median_sigma_mm,coverage,seconds,passed,score,x_mm,y_mm,z_mm,\
+                       sigma_x_mm,sigma_y_mm,sigma_z_mm,sigma_rx_deg,sigma_ry_deg,sigma_rz_deg,insertion,problem";
 
 pub(super) fn write(folder: &Path, batch: &Batch) -> Result<()> {
     let json = serde_json::to_string_pretty(batch).expect("plain data");

@@ -1,4 +1,5 @@
-//! In: several recordings of one part. Out: each of them scanned and searched, and how far the places that were found lie apart.
+//! In: several recordings of one part. Out: each of them scanned and searched, and how far the places that were found
+//! lie apart.
 //! Frame and unit: the scans' frame; mm, degrees.
 
 mod files;

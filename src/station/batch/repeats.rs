@@ -1,5 +1,5 @@
-//! In: places of one part that stood still, each with what it said of itself. Out: how far they lie apart along each axis of their frame and
-//! in the turn, beside that. Pure.
+//! In: places of one part that stood still, each with what it said of itself. Out: how far they lie apart along each
+//! axis of their frame and in the turn, beside that. Pure.
 //! Frame and unit: the scans' frame; mm, degrees; one standard deviation.
 
 use crate::geometry::{Base, Part, Rigid};
@@ -19,7 +19,8 @@ pub struct Placed {
 }
 
 impl Placed {
-    /// Of a place as reports write it: row-major 4x4, mm, sigmas along and about the part's axes. `None`: it is no place.
+    /// Of a place as reports write it: row-major 4x4, mm, sigmas along and about the part's axes. `None`: it is no
+    /// place.
     pub fn of(part: &[f64; 16], sigma_mm: [f64; 3], sigma_deg: [f64; 3]) -> Option<Placed> {
         let base_from_part = Rigid::from_rows(part).ok()?.0;
         Some(Placed { base_from_part, sigma_mm, sigma_turn_deg: sigma_deg[2] })

@@ -1,5 +1,6 @@
-//! In: recordings, a station, a recipe, settings. Out: a scan of each and what was found in it, one after the other; how the places repeat;
-//! a table of all as JSON and CSV. One that fails is named with its reason, and the others go on.
+//! In: recordings, a station, a recipe, settings. Out: a scan of each and what was found in it, one after the other;
+//! how the places repeat; a table of all as JSON and CSV. One that fails is named with its reason, and the others go
+//! on.
 //! Frame and unit: the scans' frame; mm, degrees; poses in the robot's notation.
 
 use super::files::write;
@@ -44,8 +45,8 @@ pub struct BatchOptions {
     pub stop: Arc<AtomicBool>,
 }
 
-/// Scans each and looks for the part in it; `each` hears every row as it comes. Leaves batch.json and batch.csv, a folder a scan with what
-/// was found beside it.
+/// Scans each and looks for the part in it; `each` hears every row as it comes. Leaves batch.json and batch.csv, a
+/// folder a scan with what was found beside it.
 ///
 /// # Errors
 /// Nothing to do, settings or a station that cannot be, the disk; it was stopped.
@@ -57,7 +58,7 @@ pub fn batch(options: &BatchOptions, mut each: impl FnMut(&BatchRow)) -> Result<
     let settings = changed(&settings, "extraction", &options.settings)?;
     let names = names(&options.recordings);
     if let Some(taken) = names.iter().map(|n| options.out.join(n)).find(|f| f.join("meta.json").exists()) {
-        return Err(Fault::usage(format!("{}: is a recording, a scan would go there", taken.display()))
+        return Err(Fault::usage(format!("{}: is a recording, but the scan would be written there", taken.display()))
             .cause("the folder of the recordings was given for the results")
             .next("give another folder for the results"));
     }

@@ -1,5 +1,5 @@
-//! In: pictures of a board that rides on a linear axis or turntable, with the counts there, and a station with a camera. Out: the
-//! axis' calibration, its report, and the files it came from.
+//! In: pictures of a board that rides on a linear axis or turntable, with the counts there, and a station with a
+//! camera. Out: the axis' calibration, its report, and the files it came from.
 //! Frame and unit: camera frame, mm, rad, counts.
 
 use super::board_views::{FrameBoard, boards};
@@ -53,8 +53,8 @@ pub fn calibrate_axis(
     })?;
     if found.iter().any(|(_, b)| b.board != board) {
         return Err(Fault::input("several boards ride on the axis, one is needed")
-            .cause("frames of several recordings were put together")
-            .next("record one board that stays where it is on the axis"));
+            .cause("frames of several recordings were merged")
+            .next("record one board that does not move on the axis"));
     }
     let notes = one_origin(&mut found);
     let stops: Vec<Stop> = found.iter().map(|(count, b)| Stop { count: *count, pose: b.pose.clone() }).collect();

@@ -81,7 +81,7 @@ fn sensor_of(path: &Path) -> Result<Rigid<Flange, Sensor>> {
             .cause("another file, or another transform")
             .next("give calibration/profile_hand_eye.json, or {\"flange_T_sensor\": [16 numbers, row by row, mm]}")
     };
-    let file: serde_json::Value = serde_json::from_str(&text).map_err(|e| refuse(format!("is no JSON: {e}")))?;
+    let file: serde_json::Value = serde_json::from_str(&text).map_err(|e| refuse(format!("is not JSON: {e}")))?;
     let frame = file.get("frame").and_then(|f| f.as_str());
     let rows = match (file.get("flange_T_sensor"), frame) {
         (Some(rows), _) => rows,
@@ -90,7 +90,7 @@ fn sensor_of(path: &Path) -> Result<Rigid<Flange, Sensor>> {
         (None, None) => return Err(refuse("holds no flange_T_sensor".into())),
     };
     let rows: [f64; 16] = serde_json::from_value(rows.clone())
-        .map_err(|e| refuse(format!("flange_T_sensor is no list of 16 numbers: {e}")))?;
+        .map_err(|e| refuse(format!("flange_T_sensor is not a list of 16 numbers: {e}")))?;
     Rigid::from_rows(&rows).map(|(pose, _)| pose).map_err(|e| e.at(path.display()))
 }
 
@@ -105,7 +105,8 @@ fn poses_of(path: &Path) -> Result<(Vec<Rigid<Base, Flange>>, Vec<String>)> {
     let (uf, ut) = (read[0].user_frame, read[0].tool_frame);
     if uf != 0 || ut != 0 {
         warnings.push(format!(
-            "the listing's poses are those of tool frame {ut} in user frame {uf}: the result is the sensor in that tool frame; \
+            "the listing's poses are those of tool frame {ut} in user frame {uf}: the result is the sensor in that \
+             tool frame; \
              it is the flange's only if UT {ut} is zero"
         ));
     }
@@ -132,7 +133,8 @@ fn judge(fit: &BallFit, limits: &Limits) -> Quality {
         ),
     );
     j.reasons.push(format!(
-        "the ball's centre lies on the {} side of the profile plane in most profiles; the other side fits worse by {:.0}",
+        "the ball's centre lies on the {} side of the profile plane in most profiles; the other side fits worse by \
+         {:.0}",
         if fit.side == crate::calibrate::ball::options::Side::Plus { "plus" } else { "minus" },
         fit.side_margin
     ));
@@ -140,13 +142,16 @@ fn judge(fit: &BallFit, limits: &Limits) -> Quality {
     j.at_best(Verdict::Usable, used.len() < 12, || format!("{} profiles, 12 are needed to be good", used.len()));
     for p in fit.profiles.iter().filter(|p| !p.used) {
         j.at_best(Verdict::Usable, true, || {
-            format!("{} was left out: {:.2} mm from what the others expect", p.name, p.mm)
+            format!("{} was excluded: {:.2} mm from what the others predict", p.name, p.mm)
         });
     }
     let high = fit.profiles.iter().map(|p| p.height).fold(f64::NEG_INFINITY, f64::max);
     let low = fit.profiles.iter().map(|p| p.height).fold(f64::INFINITY, f64::min);
     j.advise(j.verdict != Verdict::Good, || {
-        format!("take more profiles with the flange tilted by 20 degrees and more, the ball's centre {low:.0} to {high:.0} mm over the profile plane so far")
+        format!(
+            "take more profiles with the flange tilted by 20 degrees and more, the ball's centre {low:.0} to \
+                 {high:.0} mm over the profile plane so far"
+        )
     });
     let figures = BTreeMap::from([
         ("expected_error_at_working_distance_mm".to_string(), expected),
@@ -195,7 +200,7 @@ fn page(fit: &BallFit, quality: &Quality) -> Page {
         .profiles
         .iter()
         .map(|p| {
-            let fate = if p.used { "used" } else { "left out" };
+            let fate = if p.used { "used" } else { "excluded" };
             vec![
                 p.name.clone(),
                 format!("{} of {}", p.points[0], p.points[1]),
@@ -207,7 +212,7 @@ fn page(fit: &BallFit, quality: &Quality) -> Page {
         .collect();
     page.paragraph("Fit: the circle of each profile against the fitted ball.");
     page.table("Fit", &["profile", "points on the ball", "mm", "ball over the plane, mm", ""], &fits);
-    page.paragraph("Verification: each profile in turn was left out of the fit and then predicted.");
+    page.paragraph("Verification: each profile in turn was excluded from the fit and then predicted.");
     let held: Vec<(String, f64)> =
         fit.profiles.iter().filter(|p| p.holdout_mm.is_finite()).map(|p| (p.name.clone(), p.holdout_mm)).collect();
     page.figure("Error of each profile predicted by the others, mm", &bars(&held, "mm", None));

@@ -100,7 +100,8 @@ pub fn calibrate_hand_eye(
     notes.extend(one_origin(&mut pairs, &seen.found, run.solver.seed)?);
     if again > 0 {
         notes.push(format!(
-            "{again} of these pictures are among those that the camera was calibrated with: what they say of it counts once"
+            "{again} of these pictures are among those that the camera was calibrated with: what they say of it \
+             counts once"
         ));
     }
     let pose_name = run.poses.clone().or(recording.meta.pose_file.clone()).unwrap_or_default();
@@ -241,7 +242,8 @@ fn one_origin(pairs: &mut [Pair], found: &[FrameBoard], seed: u64) -> Result<Opt
     }
     let anew = chosen.iter().filter(|k| **k != 0).count();
     Ok(Some(format!(
-        "the board looks the same after a turn: its origin was told by the robot's poses, {anew} of {} pictures are read turned",
+        "the board looks the same after a turn: its origin follows from the robot's poses, {anew} of {} pictures are \
+         read turned",
         chosen.len()
     )))
 }

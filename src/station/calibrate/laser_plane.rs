@@ -84,8 +84,8 @@ pub fn calibrate_laser_plane(
     Ok(Calibrated { calibration, page, missing })
 }
 
-/// The stripe in pictures of boards, and the sheet that it shows: nothing needs to be known of it. `images` hold the laser's
-/// light alone.
+/// The stripe in pictures of boards, and the sheet that it shows: nothing needs to be known of it. `images` hold the
+/// laser's light alone.
 pub(super) fn sheet_on_boards(
     seen: &[FrameBoard],
     images: &[Image],

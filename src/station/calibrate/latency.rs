@@ -1,4 +1,5 @@
-//! In: a recording of a part that was passed to and fro, paired by clock; a station. Out: by how much its pictures are late against its poses.
+//! In: a recording of a part that was passed to and fro, paired by clock; a station. Out: by how much its pictures
+//! are late against its poses.
 //! Frame and unit: the cloud's frame, mm; ms.
 
 use crate::calibrate::latency::{Delay, Passing, delay};
@@ -73,8 +74,8 @@ pub fn calibrate_latency(
     let sigma_ms = 1e3 * beyond.sigma_s;
     if !(sigma_ms < WORST) {
         return Err(Fault::refused(format!("the delay is known to {sigma_ms:.2} ms only, limit {WORST}"))
-            .cause("too little of the part lies slanted, or the passes overlap little")
-            .next("pass to and fro, several times, over a part with slopes or with edges slanted to the stripe"));
+            .cause("too little of the part is slanted, or the passes overlap little")
+            .next("pass back and forth, several times, over a part with slopes or with edges slanted to the stripe"));
     }
     let latency = Latency {
         delay_ms: 1e-6 * former_ns + 1e3 * beyond.seconds,
@@ -108,7 +109,7 @@ fn pairing(recording: &Recording) -> Result<(Vec<Option<Slip>>, f64)> {
     if rates.iter().all(Option::is_none) {
         return Err(Fault::refused(format!("{}: no shot was paired by clock", recording.folder.display()))
             .cause("it was recorded standing still, or by number: then no delay matters")
-            .next("record with --pair clock --pose-stream URI while the part is passed to and fro"));
+            .next("record with --pair clock --pose-stream URI while the part is passed back and forth"));
     }
     let former: Vec<f64> = taken.iter().filter_map(|t| t.and_then(|t| t.delay_ns)).collect();
     if former.iter().any(|d| *d != former[0]) {

@@ -40,7 +40,7 @@ pub fn mount_of(station: &Path, settings: &Settings, stated: Option<Mount>) -> R
         };
         return Err(Fault::refused(format!("--mount says {}, {whence} says {}", stated.name(), known.name()))
             .cause("a wrong option, or the camera was mounted elsewhere since")
-            .next(format!("leave the option out, or set mount = \"{}\" in station.toml first", stated.name())));
+            .next(format!("omit the option, or set mount = \"{}\" in station.toml first", stated.name())));
     }
     let said = |mount: Mount, why: &str| Mounted { mount, assumed: Some(format!("mount {}: {why}", mount.name())) };
     Ok(match (set.or(stated), record) {

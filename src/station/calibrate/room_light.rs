@@ -17,12 +17,12 @@ const STEP: usize = 3;
 const DARK: f32 = 24.0;
 /// Fewest pixels of a board that tell the ratio.
 const LEAST: usize = 100;
-/// Grey levels (8 bits) that the room's light must leave on the bright print to be taken out: with less the laser's picture
-/// was taken in the dark, or through a filter.
+/// Grey levels (8 bits) that the room's light must leave on the bright print to be taken out: with less the laser's
+/// picture was taken in the dark, or through a filter.
 const LEFT: f32 = 4.0;
 
-/// How much of the room's light is in the laser's picture: the median ratio of both over the board, which the laser lights
-/// in a small part only. Two exposures of one room differ by this factor. 0 where it is none.
+/// How much of the room's light is in the laser's picture: the median ratio of both over the board, which the laser
+/// lights in a small part only. Two exposures of one room differ by this factor. 0 where it is none.
 pub fn share(
     laser: &Image,
     ambient: &Image,

@@ -1,6 +1,6 @@
-//! In: stripe peaks of pictures, boards of known pose in them. Out: of each picture the peaks along the strongest straight
-//! line on its board (stage `hough`) and along a second one nearly as strong: a flat board cuts the sheet in a line, dots and
-//! halos do not lie on it; which of two lines is the sheet only all pictures together can tell.
+//! In: stripe peaks of pictures, boards of known pose in them. Out: of each picture the peaks along the strongest
+//! straight line on its board (stage `hough`) and along a second one nearly as strong: a flat board cuts the sheet in
+//! a line, dots and halos do not lie on it; which of two lines is the sheet only all pictures together can tell.
 //! Frame and unit: pixels of a camera without lens distortion, in which the line is straight.
 
 use crate::calibrate::boards::extent::inside;
@@ -11,7 +11,8 @@ use crate::geometry::Vec2;
 use crate::gpu::Device;
 use crate::stages::stripe::hough::{HoughFrame, HoughParams, lines, vote};
 
-/// Half width of the line's surroundings in stripe sigmas, and at least 2 px: a centre that is farther off is another's.
+/// Half width of the line's surroundings in stripe sigmas, and at least 2 px: a centre that is farther off is
+/// another's.
 const NEAR_WIDTHS: f64 = 3.0;
 /// Share of the strongest line's pixels from which on a second one is kept, too.
 const RIVAL: f64 = 0.4;

@@ -20,7 +20,7 @@ impl<'a> Document<'a> {
     /// The text is no TOML.
     pub fn parse(text: &'a str) -> Result<Document<'a>> {
         let root = text.parse().map_err(|e: toml_edit::TomlError| {
-            Fault::input(format!("is no TOML: {}", e.to_string().trim_end())).next("correct the text")
+            Fault::input(format!("is not TOML: {}", e.to_string().trim_end())).next("correct the text")
         })?;
         let mark = ('\u{e000}'..).find(|c| !text.contains(*c)).expect("a text has fewer characters than there are");
         Ok(Document { before: text, root, mark })
@@ -186,7 +186,7 @@ fn put_inline(whole: &mut Value, path: &[&str], value: Option<&Json>) -> Result<
 }
 
 fn no_table(name: &str) -> Fault {
-    Fault::usage(format!("{name} is no table")).next("correct the name, or change the text itself")
+    Fault::usage(format!("{name} is not a table")).next("correct the name, or change the text itself")
 }
 
 /// A value as TOML writes it.

@@ -57,7 +57,7 @@ fn drop_nulls(value: &mut serde_json::Value) {
 pub fn point_taken_out(text: &str, name: &str) -> Result<String> {
     let mut wanted = Recipe::parse(text)?;
     let index = wanted.construction.iter().position(|c| c.name == name).ok_or_else(|| {
-        Fault::input(format!("{name}: is no constructed point of this recipe")).next("choose one of the list")
+        Fault::input(format!("{name}: is not a constructed point of this recipe")).next("choose one of the list")
     })?;
     wanted.construction.remove(index);
     wanted.check()?;
@@ -85,7 +85,7 @@ fn checked(text: String, wanted: &Recipe) -> Result<String> {
 }
 
 fn strange() -> Fault {
-    Fault::input("the recipe's text is laid out so that a point in it cannot be changed by itself")
+    Fault::input("the recipe's text has an unusual layout, so that a single point cannot be changed")
         .cause("its constructed points are no list of tables")
         .next("change them in the text")
 }

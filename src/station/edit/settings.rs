@@ -22,7 +22,7 @@ pub fn edited(text: &str, changes: &BTreeMap<String, Value>) -> Result<String> {
     if pruned(toml::from_str(&made).unwrap_or_default()) == meant {
         return Ok(made);
     }
-    Err(Fault::input("station.toml is laid out so that this setting in it cannot be changed by itself")
+    Err(Fault::input("station.toml has an unusual layout, so that this setting alone cannot be changed")
         .cause("a table is written in an unusual way")
         .next("change the text itself"))
 }
@@ -37,7 +37,7 @@ fn meant(text: &str, changes: &BTreeMap<String, Value>) -> Result<toml::Table> {
         let mut at = &mut all;
         for word in tables.split('.').filter(|w| !w.is_empty()) {
             let below = at.entry(word).or_insert_with(|| toml::Value::Table(toml::Table::new()));
-            at = below.as_table_mut().ok_or_else(|| refuse(format!("{word} is no table of settings")))?;
+            at = below.as_table_mut().ok_or_else(|| refuse(format!("{word} is not a table of settings")))?;
         }
         match Some(value).filter(|v| !v.is_null()).map(toml::Value::try_from).transpose() {
             Ok(Some(value)) => drop(at.insert(name.to_owned(), value)),
@@ -71,7 +71,7 @@ pub fn changed(settings: &Settings, below: &str, changes: &BTreeMap<String, Valu
         for word in table.split('.').filter(|w| !w.is_empty()) {
             at = at.as_object_mut().expect("a table").entry(word).or_insert_with(|| Value::Object(Default::default()));
             if !at.is_object() {
-                return Err(Fault::usage(format!("{key}: {word} is no table of settings")).next("correct the name"));
+                return Err(Fault::usage(format!("{key}: {word} is not a table of settings")).next("correct the name"));
             }
         }
         let at = at.as_object_mut().expect("a table");
@@ -88,7 +88,7 @@ pub fn changed(settings: &Settings, below: &str, changes: &BTreeMap<String, Valu
     };
     let changed: Settings = serde_json::from_value(Value::Object(all)).map_err(|e| {
         Fault::input(format!("the settings cannot be changed so: {e}"))
-            .cause("a name that is none, a value of another kind, or a part of a table is missing")
+            .cause("unknown key, wrong type, or missing key")
             .next("compare it with docs/file-formats.md")
     })?;
     changed.check()?;

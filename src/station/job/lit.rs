@@ -1,5 +1,5 @@
-//! In: an arm that stands over the board, a camera, the line on its output. Out: that the line is seen, from one picture, before
-//! a sweep is made with it.
+//! In: an arm that stands over the board, a camera, the line on its output. Out: that the line is seen, from one
+//! picture, before a sweep is made with it.
 //! Frame and unit: points of one shot, counted.
 
 use super::eye::Eye;
@@ -37,5 +37,5 @@ pub fn line_is_seen(eye: &mut Eye, arm: &mut dyn Arm, rig: &Rig, settings: &Sett
         "the line is not seen with its laser on: {points} points, at least {least} are asked for{why}"
     ))
     .cause("the laser is not switched by its output, its shutter is closed, or the board is out of its reach")
-    .next("look whether the line is lit and lies on the board, then begin again"))
+    .next("check that the line is on and lies on the board, then begin again"))
 }

@@ -1,5 +1,5 @@
-//! In: a job's state, a robot behind its rules, a camera, a station, a recipe, a person. Out: the job done, or stopped where it says.
-//! A crash at any moment leaves a state from which it goes on or backs out.
+//! In: a job's state, a robot behind its rules, a camera, a station, a recipe, a person. Out: the job done, or
+//! stopped where it says. A crash at any moment leaves a state from which it goes on or backs out.
 //! Frame and unit: base frame; mm, mm/s, degrees, s.
 
 use super::eye::Eye;
@@ -82,7 +82,7 @@ impl<'a> Job<'a> {
         operator: &'a mut dyn Operator,
     ) -> Result<Job<'a>> {
         if !(0.1..=20.0).contains(&options.max_tilt_deg) {
-            return Err(Fault::usage(format!("max_tilt_deg is {}, wanted 0.1 to 20", options.max_tilt_deg))
+            return Err(Fault::usage(format!("max_tilt_deg is {}; allowed: 0.1 to 20", options.max_tilt_deg))
                 .next("correct the option"));
         }
         options.sweep_mm.map(checked).transpose()?;
@@ -94,7 +94,7 @@ impl<'a> Job<'a> {
         let format = camera.format();
         rig.need_camera()?.same_pictures([format.width, format.height], camera.readout().as_ref())?;
         if settings.tool.is_none() {
-            return Err(Fault::usage("where the gripper's tool is on the flange is not known")
+            return Err(Fault::usage("the pose of the gripper's tool on the flange is unknown")
                 .cause("station.toml has no [tool]")
                 .next("write [tool] with flange_from_tool = [16 numbers] (docs/robots.md)"));
         }
@@ -331,7 +331,8 @@ impl<'a> Job<'a> {
         Ok(Phase::Approach)
     }
 
-    /// What was found, for those who look: the report, its picture, and what the camera sees of the part in the room's light.
+    /// What was found, for those who look: the report, its picture, and what the camera sees of the part in the
+    /// room's light.
     fn keep(&mut self, report: &Report) -> Result<()> {
         let text = serde_json::to_string_pretty(report).expect("plain data");
         let png = picture::draw(report, &self.recipe.drawing()).to_png();
@@ -433,11 +434,15 @@ fn way_up(at: &Vec3, down: &Vec3, up: &Vec3) -> Result<Vec3> {
     let way = up - down;
     if !(way.norm() > LEAST_WAY_MM && way.norm().is_finite()) {
         return Err(Fault::input(format!(
-            "the job's retract pose is {:.3} mm from its insertion pose, more than {LEAST_WAY_MM} is needed to know the way up",
+            "the job's retract pose is {:.3} mm from its insertion pose, more than {LEAST_WAY_MM} is needed to know \
+             the direction up",
             way.norm()
         ))
-        .cause("its recipe had retract_mm = 0, or the pose is none")
-        .next("take the tool up with the pendant, set retract_mm in the recipe, then begin a new job in another folder"));
+        .cause("its recipe had retract_mm = 0, or the pose is not finite")
+        .next(
+            "take the tool up with the pendant, set retract_mm in the recipe, then begin a new job in another \
+               folder",
+        ));
     }
     let axis = way.normalize();
     let mm = (up - at).dot(&axis);
@@ -451,13 +456,13 @@ fn finite(plan: &Plan) -> Result<()> {
     match plan.legs.iter().position(|leg| !numbers(leg)) {
         None => Ok(()),
         Some(k) => Err(Fault::refused(format!(
-            "{}: motion {} of {} leads to {:?} mm, which is no place",
+            "{}: motion {} of {} leads to {:?} mm, which is not a place",
             plan.name,
             k + 1,
             plan.legs.len(),
             plan.legs[k].to.translation.as_slice()
         ))
-        .cause("a number of the recipe, the calibration or the scan is none")
+        .cause("a number of the recipe, the calibration or the scan is not finite")
         .next(
             "look at the robot, take it away from the part with the pendant, then begin a new job in another folder",
         )),

@@ -21,14 +21,15 @@ pub struct Ask<'a> {
 pub trait Operator {
     /// Shows a motion and asks. `None` is a no.
     fn confirm(&mut self, ask: &Ask) -> Result<Option<Confirmation>>;
-    /// Whether the last question was left without an answer for so long that it is to be asked anew, from how things are then.
+    /// Whether the last question was left without an answer for so long that it is to be asked anew, from how things
+    /// are then.
     fn again(&mut self) -> bool {
         false
     }
     /// The motion that was confirmed has ended, or was stopped.
     fn over(&mut self) {}
-    /// Asks whether a person has looked at the robot; `why` says what was not known. Only a person's own act makes this true, or a robot
-    /// that is a simulated one.
+    /// Asks whether a person has looked at the robot; `why` says what was not known. Only a person's own act makes
+    /// this true, or a robot that is a simulated one.
     fn looked(&mut self, why: &str) -> Result<bool>;
     /// Says what happens.
     fn tell(&mut self, line: &str);

@@ -1,5 +1,5 @@
-//! In: a step, a speed, what camera, chain and arm can. Out: speed, step and pictures a second that go together, and which of the three
-//! allows no more. Pure.
+//! In: a step, a speed, what camera, chain and arm can. Out: speed, step and pictures a second that go together, and
+//! which of the three allows no more. Pure.
 //! Frame and unit: mm/s, mm a shot, pictures a second (Hz), s.
 
 use crate::fault::{Fault, Result};
@@ -43,7 +43,7 @@ pub fn pace(step_mm: f64, speed_mm_s: Option<f64>, length_mm: f64, can: &Can) ->
     let rates = [("camera's rate", can.camera_hz), ("chain's rate", can.chain_hz), ("limit of speed", can.speed_mm_s)];
     let none = |v: &f64| !(*v > 0.0 && v.is_finite());
     if let Some((name, v)) = stated.iter().chain(&rates).find_map(|(n, v)| v.filter(none).map(|v| (n, v))) {
-        return Err(Fault::usage(format!("the {name} is {v}, more than 0 is wanted")).next("correct the number"));
+        return Err(Fault::usage(format!("the {name} is {v}, more than 0 is needed")).next("correct the number"));
     }
     let by_rate = |name, hz: Option<f64>| hz.map(|hz| (name, hz * step_mm));
     let all = [by_rate("camera", can.camera_hz), by_rate("chain", can.chain_hz), can.speed_mm_s.map(|v| ("speed", v))];

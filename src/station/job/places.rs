@@ -1,5 +1,6 @@
-//! In: where the camera stands, how far the board is, how the beams lie in the camera's frame. Out: flange poses from which the
-//! pointer touches the board around the picture's middle, and along which the line sweeps over it; which touches are the board's. Pure.
+//! In: where the camera stands, how far the board is, how the beams lie in the camera's frame. Out: flange poses from
+//! which the pointer touches the board around the picture's middle, and along which the line sweeps over it; which
+//! touches are the board's. Pure.
 //! Frame and unit: base_from_flange, mm.
 
 use crate::geometry::{Base, Camera, Flange, Plane, Ray, Rigid, Vec2, Vec3};
@@ -9,8 +10,8 @@ use crate::geometry::{Base, Camera, Flange, Plane, Ray, Rigid, Vec2, Vec3};
 pub(super) const TOUCHES: [[f64; 2]; 8] =
     [[-1.0, -0.5], [-0.5, -1.0], [0.5, -1.0], [1.0, -0.5], [1.0, 0.5], [0.5, 1.0], [-0.5, 1.0], [-1.0, 0.5]];
 
-/// Flange poses from which the pointer's spots lie around `middle`, `half` mm to each side: a place of the board in the frame of the
-/// camera as it stands now. The camera goes to `then` from the board.
+/// Flange poses from which the pointer's spots lie around `middle`, `half` mm to each side: a place of the board in
+/// the frame of the camera as it stands now. The camera goes to `then` from the board.
 pub fn touches(
     base_from_camera: &Rigid<Base, Camera>,
     flange_from_camera: &Rigid<Flange, Camera>,
@@ -27,21 +28,23 @@ pub fn touches(
     TOUCHES.iter().map(place).collect()
 }
 
-/// Indices of the touches that lie within `gate` mm of one plane, the most that do; empty where that is not more than half of them.
+/// Indices of the touches that lie within `gate` mm of one plane, the most that do; empty where that is not more than
+/// half of them.
 pub fn on_one_plane(points: &[Vec3], gate: f64) -> Vec<usize> {
     let most = planes(points, gate).max_by(|a, b| a.0.len().cmp(&b.0.len()).then(b.1.total_cmp(&a.1)));
     most.map(|m| m.0).filter(|on| 2 * on.len() > points.len()).unwrap_or_default()
 }
 
-/// Middle of the touches, in the camera's frame, that lie within `gate` mm of one plane: of the most, of as many the ones nearest to the
-/// camera, for a board lies on a table. `None` where no four do; three always lie on a plane.
+/// Middle of the touches, in the camera's frame, that lie within `gate` mm of one plane: of the most, of as many the
+/// ones nearest to the camera, for a board lies on a table. `None` where no four do; three always lie on a plane.
 pub fn most_on_one_plane(points: &[Vec3], gate: f64) -> Option<Vec3> {
     let middle = |on: &[usize]| on.iter().map(|&i| points[i]).sum::<Vec3>() / on.len() as f64;
     let four = planes(points, gate).filter(|p| p.0.len() >= 4).map(|p| (p.0.len(), middle(&p.0)));
     four.max_by(|a, b| a.0.cmp(&b.0).then(b.1.z.total_cmp(&a.1.z))).map(|m| m.1)
 }
 
-/// The planes through three touches each: which touches lie within `gate` mm of one, and the sum of their squared distances.
+/// The planes through three touches each: which touches lie within `gate` mm of one, and the sum of their squared
+/// distances.
 fn planes(points: &[Vec3], gate: f64) -> impl Iterator<Item = (Vec<usize>, f64)> {
     let n = points.len();
     let through = move |(i, j, k): (usize, usize, usize)| {
@@ -59,8 +62,8 @@ fn planes(points: &[Vec3], gate: f64) -> impl Iterator<Item = (Vec<usize>, f64)>
     })
 }
 
-/// Flange poses of a sweep: the camera looks as it does at `square`, `depth` from the board, and goes along the direction across
-/// its stripe so that the stripe passes over `length` mm about the foot of the axis, in steps.
+/// Flange poses of a sweep: the camera looks as it does at `square`, `depth` from the board, and goes along the
+/// direction across its stripe so that the stripe passes over `length` mm about the foot of the axis, in steps.
 pub fn sweep(
     square: &Rigid<Base, Flange>,
     flange_from_camera: &Rigid<Flange, Camera>,

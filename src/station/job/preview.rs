@@ -1,5 +1,5 @@
-//! In: a station, a recipe, what is known of board, camera and chain. Out: the sweep that a job would make, and how fast a scan along it
-//! goes, before anything moves.
+//! In: a station, a recipe, what is known of board, camera and chain. Out: the sweep that a job would make, and how
+//! fast a scan along it goes, before anything moves.
 //! Frame and unit: base frame; mm, mm/s, pictures a second.
 
 use super::pace::{Can, Pace, pace};
@@ -45,7 +45,8 @@ pub struct Preview {
     pub sweep: SweepFigures,
     /// The flange at the first and the last shot; none where nobody knows where the robot stands.
     pub flange: Option<[Rigid<Base, Flange>; 2]>,
-    /// What is swept, and how far a part in its middle reaches, in the camera's picture as it stands now, px; empty: not known.
+    /// What is swept, and how far a part in its middle reaches, in the camera's picture as it stands now, px; empty:
+    /// not known.
     pub seen_px: Vec<Vec<[f64; 2]>>,
     /// What limits the pace.
     pub can: Can,

@@ -1,4 +1,5 @@
-//! In: pictures and the poses at which they were taken. Out: a recording in the recording format, complete when it has its meta.json.
+//! In: pictures and the poses at which they were taken. Out: a recording in the recording format, complete when it
+//! has its meta.json.
 //! Frame and unit: base_from_flange, mm.
 
 use crate::arm::TimedPose;

@@ -62,7 +62,7 @@ impl JobReport {
         match self.resumes {
             Resumes::Over => "look at the cell, then begin a new job",
             Resumes::Up => "look at the cell; resumed it goes back up, nothing else",
-            Resumes::On | Resumes::Anew => "look at the cell; resumed it measures anew, backed out of it goes back up",
+            Resumes::On | Resumes::Anew => "look at the cell; resumed it measures again, backed out of it goes back up",
         }
     }
 }

@@ -1,4 +1,5 @@
-//! In: an arm that has come to a stop, a camera, a beam. Out: a picture of the beam in a recording, with the pose at which it was taken.
+//! In: an arm that has come to a stop, a camera, a beam. Out: a picture of the beam in a recording, with the pose at
+//! which it was taken.
 //! Frame and unit: base_from_flange, mm; ms.
 
 use super::eye::Eye;
@@ -29,7 +30,7 @@ pub fn shoot(eye: &mut Eye, arm: &mut dyn Arm, record: &mut Record, beam: Option
             "the arm moved by {mm:.3} mm while the picture was taken, limit {}",
             STILL[0]
         ))
-        .cause("it still swings, or somebody jogs it")
+        .cause("the arm still swings, or somebody jogs it")
         .next("begin again"));
     }
     record.shot(&picture, &after)

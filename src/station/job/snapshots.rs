@@ -44,7 +44,7 @@ impl Snapshots {
                 }
                 Event::Lost(fault) => return Err(fault),
                 Event::Ended => {
-                    return Err(Fault::input(format!("{}: no picture comes any more", self.camera.name()))
+                    return Err(Fault::input(format!("{}: no more pictures arrive", self.camera.name()))
                         .next("use a camera that runs, not a file"));
                 }
                 Event::Incomplete { .. } | Event::Quiet => {}

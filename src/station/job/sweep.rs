@@ -1,6 +1,8 @@
-//! In: a station, a recipe, from where the board was seen. Out: how the line goes over the part before anything is scanned: a pose a shot,
-//! and what is left beside part, picture, working volume and box. The job moves by it; page and command line show the same.
-//! Frame and unit: base frame; the board as the camera sees it squarely, from the foot of its axis (x right, y down); mm.
+//! In: a station, a recipe, from where the board was seen. Out: how the line goes over the part before anything is
+//! scanned: a pose a shot, and what is left beside part, picture, working volume and box. The job moves by it; page
+//! and command line show the same.
+//! Frame and unit: base frame; the board as the camera sees it squarely, from the foot of its axis (x right, y down);
+//! mm.
 
 use super::places;
 use crate::arm::rules::Space;
@@ -31,8 +33,8 @@ pub struct Board {
 }
 
 impl Board {
-    /// Before anything was touched: squarely before the camera, as far from it as the rig works, or as is stated. Without a robot's pose
-    /// the camera's own frame stands for the base.
+    /// Before anything was touched: squarely before the camera, as far from it as the rig works, or as is stated.
+    /// Without a robot's pose the camera's own frame stands for the base.
     ///
     /// # Errors
     /// A rig without hand-eye; a distance that is none; nobody knows how far the rig looks.
@@ -49,7 +51,7 @@ impl Board {
         });
         let distance = distance_mm.map_or_else(|| volume::view(settings, rig).map(|v| v.middle()), Ok)?;
         if !(distance > 0.0 && distance.is_finite()) {
-            return Err(Fault::usage(format!("the board is {distance} mm before the camera, more than 0 is wanted"))
+            return Err(Fault::usage(format!("the board is {distance} mm before the camera, more than 0 is needed"))
                 .next("give the distance along the camera's axis, mm"));
         }
         let camera = start * hand_eye;
@@ -90,7 +92,8 @@ pub struct SweepFigures {
     pub along_mm: f64,
     /// The same along the stripe, whose ends are the picture's.
     pub across_mm: f64,
-    /// How far something may stand above the board, and lie below it, within the working volume, mm; none: nobody knows it.
+    /// How far something may stand above the board, and lie below it, within the working volume, mm; none: nobody
+    /// knows it.
     pub volume_mm: Option<[f64; 2]>,
     /// How far the flange stays inside the box of `[motion]`, mm; negative: outside; none: no box is stated.
     pub box_mm: Option<f64>,
@@ -115,8 +118,8 @@ impl SweepFigures {
 }
 
 impl Sweep {
-    /// What is swept and how far a part in its middle reaches, as the camera on the flange sees them, px; closed lines, an integer pixel is a
-    /// pixel's centre. `None`: some of it lies where the lens shows nothing.
+    /// What is swept and how far a part in its middle reaches, as the camera on the flange sees them, px; closed
+    /// lines, an integer pixel is a pixel's centre. `None`: some of it lies where the lens shows nothing.
     pub fn seen(&self, rig: &Rig, flange: &Rigid<Base, Flange>) -> Option<[Vec<[f64; 2]>; 2]> {
         let (camera, hand_eye) = (rig.camera.as_ref()?.value, rig.hand_eye.as_ref()?.value);
         let from_square = (*flange * hand_eye).inverse() * (self.square * hand_eye);
@@ -139,8 +142,8 @@ impl Sweep {
     }
 }
 
-/// The sweep over a part that lies about the foot of the camera's axis. `halvings`: so often its step is halved, 0 to 3; it is finer than
-/// what a pixel sees then, and averages what the arm scatters by.
+/// The sweep over a part that lies about the foot of the camera's axis. `halvings`: so often its step is halved, 0 to
+/// 3; it is finer than what a pixel sees then, and averages what the arm scatters by.
 ///
 /// # Errors
 /// A calibration is missing; a length out of range; a line that lies beside the picture at that distance.
@@ -194,7 +197,7 @@ pub(super) fn checked(mm: f64) -> Result<f64> {
     if STATED.contains(&mm) {
         return Ok(mm);
     }
-    Err(Fault::usage(format!("the sweep is {mm} mm, wanted {} to {}", STATED.start(), STATED.end()))
+    Err(Fault::usage(format!("the sweep is {mm} mm; allowed: {} to {}", STATED.start(), STATED.end()))
         .next("correct the option"))
 }
 
@@ -249,7 +252,7 @@ fn stripe(plane: &Plane<Camera>, depth: f64, field: &[f64; 4]) -> Result<[f64; 2
         "at {depth:.0} mm the line lies {:.1} mm beside the picture's middle, out of the picture",
         from.norm()
     ))
-    .cause("the working volume lies where sheet and picture do not meet, or the laser plane is another rig's")
+    .cause("sheet and picture do not meet in the working volume, or the laser plane belongs to another rig")
     .next("state [working_volume] in station.toml where the line is seen, or calibrate the laser plane"))
 }
 
@@ -279,7 +282,8 @@ mod tests {
         let s = sweep(&settings, &rig, &recipe, Some(60.0), 0, &board).unwrap();
         let f = &s.figures;
         assert_eq!((f.shots, f.length_mm), (s.flanges.len(), 60.0));
-        // The sheet, carried along, meets the board where the corners say, and there the camera sees it at its picture's edge.
+        // The sheet, carried along, meets the board where the corners say, and there the camera sees it at its
+        // picture's edge.
         let (hand_eye, plane) = (rig.hand_eye.as_ref().unwrap().value, rig.laser_plane.as_ref().unwrap().value);
         let camera = rig.camera.as_ref().unwrap().value;
         let base_from_square = s.square * hand_eye;
@@ -303,7 +307,8 @@ mod tests {
         }
         assert!((f.along_mm - (30.0 - f.part_mm / 2.0)).abs() < 1e-12 && f.across_mm > 0.0, "{f:?}");
         assert!(sweep(&settings, &rig, &recipe, Some(4.0), 0, &board).is_err());
-        // From the square pose itself the first and last stripe end at the picture's edges, but for what the lens bends.
+        // From the square pose itself the first and last stripe end at the picture's edges, but for what the lens
+        // bends.
         let [swept, round] = s.seen(&rig, &s.square).unwrap();
         assert!(swept.len() == 33 && swept[0] == swept[32] && round[0][0] - round[16][0] > 100.0, "{swept:?}");
         let wide = camera.fx * f.part_mm / depth;

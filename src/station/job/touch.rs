@@ -1,5 +1,5 @@
-//! In: a job's arm, camera and pointer. Out: the board's plane, from touches around the picture's middle; where they meet several
-//! surfaces, from touches around those of them that lie on one.
+//! In: a job's arm, camera and pointer. Out: the board's plane, from touches around the picture's middle; where they
+//! meet several surfaces, from touches around those of them that lie on one.
 //! Frame and unit: base frame; mm, degrees.
 
 use super::machine::Job;
@@ -14,7 +14,8 @@ use crate::recording::{Beam, Recording};
 use crate::station::range::{RangeReport, RangeRun, measure_range};
 use crate::station::volume;
 
-/// Touches of one board lie about its plane by less than this share of the view's distance: a board's thickness is more.
+/// Touches of one board lie about its plane by less than this share of the view's distance: a board's thickness is
+/// more.
 const ONE_PLANE: f64 = 0.002;
 /// A touched board whose points scatter more than this about their plane, as a share of the view's distance, is none.
 const FLAT: f64 = 0.01;
@@ -41,7 +42,8 @@ impl Job<'_> {
         let touches = self.touch_around(&base_from_camera, &around, then)?;
         let (points, on) = self.on_one_plane(&touches, then)?;
         let touched = match on.len() {
-            // The board ends in the picture, or parts stand on it: those that met one surface say where to look for more.
+            // The board ends in the picture, or parts stand on it: those that met one surface say where to look for
+            // more.
             0 => {
                 let camera: Vec<Vec3> = points.iter().map(|p| base_from_camera.inverse().point(&p.1)).collect();
                 let middle = places::most_on_one_plane(&camera, ONE_PLANE * then);
@@ -102,7 +104,8 @@ impl Job<'_> {
         record.end()
     }
 
-    /// The touched points by their pictures, and those of them that lie on one plane; none where that is not more than half.
+    /// The touched points by their pictures, and those of them that lie on one plane; none where that is not more
+    /// than half.
     fn on_one_plane(&self, touches: &Recording, distance: f64) -> Result<(Vec<(String, Vec3)>, Vec<usize>)> {
         let all = measure_range(touches, &self.rig, &RangeRun::default())?;
         let points: Vec<(String, Vec3)> =
@@ -118,7 +121,7 @@ impl Job<'_> {
         let (points, on) = self.on_one_plane(&touches, distance)?;
         if on.is_empty() {
             return Err(Fault::refused(format!(
-                "of {} touches no more than half lie on one plane within {:.2} mm",
+                "at most half of {} touches lie on one plane within {:.2} mm",
                 points.len(),
                 ONE_PLANE * distance
             ))
@@ -142,8 +145,11 @@ impl Job<'_> {
         let seen = measure_range(&record.end()?, &self.rig, &RangeRun { coarse: true, ..RangeRun::default() });
         let missing = |what: String| {
             Fault::refused(format!("the pointer's spot is not in the first picture: {what}"))
-                .cause("the board is out of view or out of the pointer's range, or the pointer is not switched by its output")
-                .next("jog the arm until the board is in view, look whether the pointer is lit, then begin again")
+                .cause(
+                    "the board is out of view or out of the pointer's range, or the pointer is not switched by \
+                        its output",
+                )
+                .next("jog the arm until the board is in view, check that the pointer is on, then begin again")
         };
         let seen = seen.map_err(|e| missing(e.what))?;
         let first = seen

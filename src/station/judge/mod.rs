@@ -1,4 +1,5 @@
-//! In: a finished scan, the truth of the simulated station where there is one. Out: its errors, and the page that shows it.
+//! In: a finished scan, the truth of the simulated station where there is one. Out: its errors, and the page that
+//! shows it.
 //! Frame and unit: base frame, mm.
 
 pub(super) mod embed;

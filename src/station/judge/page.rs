@@ -115,13 +115,15 @@ fn errors(scan: &Path, j: &Judged) -> Result<Markup> {
         section {
             h2 { "Errors against the truth" }
             p {
-                "The station was simulated, so the exact surface is known: this is the distance of every point from it, "
+                "The station was simulated, so the exact surface is known: this is the distance of every point from \
+                 it, "
                 "not a residual of a fit."
             }
             div.pair {
                 (histogram(j))
                 @if map {
-                    (picture(scan, "error_picture.png", "Distance of each cell of the height map from the true surface")?)
+                    (picture(scan, "error_picture.png", "Distance of each cell of the height map from the true \
+                                                         surface")?)
                 }
             }
             table {
@@ -133,7 +135,8 @@ fn errors(scan: &Path, j: &Judged) -> Result<Markup> {
                 @for (name, e) in rows { (row(name, e)) }
             }
             p.small {
-                "rms without the points beyond 1 mm. Exact on faces; beside the edges of holes the distance is a lower bound."
+                "rms without the points beyond 1 mm. Exact on faces; beside the edges of holes the distance is a \
+                 lower bound."
             }
         }
     })
@@ -149,7 +152,8 @@ fn histogram(j: &Judged) -> Markup {
         figure {
             svg viewBox="0 0 480 200" {
                 @for (i, &n) in j.histogram.iter().enumerate() {
-                    rect x=(left(i)) y=(format!("{:.1}", 160.0 - height(n))) width="17" height=(format!("{:.1}", height(n))) {}
+                    rect x=(left(i)) y=(format!("{:.1}", 160.0 - height(n))) width="17" height=(format!("{:.1}",
+                        height(n))) {}
                 }
                 @for i in (0..j.histogram.len()).step_by(5) {
                     text x=(left(i)) y="178" { (format!("{:.2}", i as f64 * HISTOGRAM_STEP)) }
@@ -157,8 +161,10 @@ fn histogram(j: &Judged) -> Markup {
                 text x="200" y="196" { "distance from the surface, mm" }
             }
             figcaption {
-                "Points by distance; the last bar takes all beyond " (format!("{last:.2}")) " mm. Within 1, 2, 3 of their own "
-                "stated standard deviations: " (one) ", " (two) ", " (three) " % (a normal distribution: 68.3, 95.4, 99.7)."
+                "Points by distance; the last bar takes all beyond " (format!("{last:.2}")) " mm. Within 1, 2, 3 of \
+                    their own "
+                "stated standard deviations: " (one) ", " (two) ", " (three) " % (a normal distribution: 68.3, 95.4, \
+                    99.7)."
             }
         }
     }
@@ -203,7 +209,8 @@ fn shots(scan: &Path) -> Result<Markup> {
         section {
             h2 { "Shots with their peaks" }
             p {
-                "Every peak that was found, in the colour of what became of it. Rejected peaks are kept with their reason."
+                "Every peak that was found, in the colour of what became of it. Rejected peaks are kept with their \
+                 reason."
             }
             @for name in &names { (picture(&folder, name, &name.replace(".png", "").replace('_', " "))?) }
         }
@@ -220,13 +227,14 @@ fn peaks(r: &ScanReport) -> Markup {
             table {
                 tr { th { "fate" } th { "peaks" } th { "share" } }
                 @for (fate, &n) in rows {
-                    tr { td { (fate) } td { (thousands(n)) } td { (format!("{:.3} %", 100.0 * n as f64 / all.max(1) as f64)) } }
+                    tr { td { (fate) } td { (thousands(n)) } td { (format!("{:.3} \
+                        %", 100.0 * n as f64 / all.max(1) as f64)) } }
                 }
             }
             p { (r.seen.words()) "." }
             @if !r.dark_shots.is_empty() { p { (r.dark_shots.len()) " shots without a stripe." } }
             @for remark in &r.remarks { p { "Note: " (remark) } }
-            @for (name, why) in &r.skipped { p { "Left out " (name) ": " (why) } }
+            @for (name, why) in &r.skipped { p { "Excluded " (name) ": " (why) } }
         }
     }
 }

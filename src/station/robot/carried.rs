@@ -6,8 +6,9 @@ use crate::geometry::{Camera, Ray, Vec3};
 use crate::rig::Rig;
 use crate::station::settings::Settings;
 
-/// Tool and sensor head as station.toml states them. Where it states no head, the calibration says where the camera is, and where the
-/// pointer's beam leaves the camera's plane. A rig that cannot be read describes nothing, and the reason is shown with every motion.
+/// Tool and sensor head as station.toml states them. Where it states no head, the calibration says where the camera
+/// is, and where the pointer's beam leaves the camera's plane. A rig that cannot be read describes nothing, and the
+/// reason is shown with every motion.
 pub fn carried(settings: &Settings, rig: &Result<Rig>) -> Carried {
     let tool = settings.tool.map(|t| t.flange_from_tool.translation);
     let stated = settings.head.as_ref().map(|h| h.points_mm.iter().map(|p| Vec3::from(*p)).collect());

@@ -1,4 +1,5 @@
-//! A station's robot behind its motion rules: limits, tool and sensor head come from the station's folder, and no caller leaves them out.
+//! A station's robot behind its motion rules: limits, tool and sensor head come from the station's folder, and no
+//! caller leaves them out.
 
 use super::carried::carried;
 use crate::arm::rules::{Guard, MotionLog};

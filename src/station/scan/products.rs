@@ -11,8 +11,8 @@ use crate::scan::{CloudFile, GridOptions, HeightMap, grid_on, write_pcd};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Writes everything that is derived from the cloud; no figures where there are too few points for a map. With them come
-/// the SHA-256 of cloud and map by file name.
+/// Writes everything that is derived from the cloud; no figures where there are too few points for a map. With them
+/// come the SHA-256 of cloud and map by file name.
 pub fn write(
     out: &Path,
     cloud: &Path,

@@ -1,4 +1,5 @@
-//! In: a recording, a station. Out: its scan, with the station's own settings; by what a resumed scan knows the recording.
+//! In: a recording, a station. Out: its scan, with the station's own settings; by what a resumed scan knows the
+//! recording.
 //! Frame and unit: cloud in the base frame, mm.
 
 use super::report::ScanReport;
@@ -13,9 +14,9 @@ use crate::station::volume::believed;
 use std::path::Path;
 
 impl ScanOptions {
-    /// What a station's settings ask for, into the folder `out`: wherever it is fastest, no overlays, no ambient picture,
-    /// nothing skipped, not resumed. `rig` is the station's calibration, which knows the believed depths where the
-    /// settings leave them open.
+    /// What a station's settings ask for, into the folder `out`: wherever it is fastest, no overlays, no ambient
+    /// picture, nothing skipped, not resumed. `rig` is the station's calibration, which knows the believed depths
+    /// where the settings leave them open.
     pub fn for_station(settings: &Settings, rig: &Rig, out: &Path) -> ScanOptions {
         ScanOptions {
             out: out.to_owned(),
@@ -35,8 +36,8 @@ impl ScanOptions {
     }
 }
 
-/// Scans a recording by the motion that it states, a robot's with the poses of that name (the one that meta.json names, where
-/// it is `None`). `progress` is told (shots done, shots in all).
+/// Scans a recording by the motion that it states, a robot's with the poses of that name (the one that meta.json
+/// names, where it is `None`). `progress` is told (shots done, shots in all).
 ///
 /// # Errors
 /// Those of [`scan`], and of the recording's poses or counts.
@@ -54,8 +55,8 @@ pub fn scan_recording(
     scan(&id, &recording.folder.display().to_string(), open, rig, options, progress)
 }
 
-/// What a resumed scan must have in common with the interrupted one: a hash of meta.json, of the poses or counts, of the channel
-/// and of the ambient picture.
+/// What a resumed scan must have in common with the interrupted one: a hash of meta.json, of the poses or counts, of
+/// the channel and of the ambient picture.
 fn identity(recording: &Recording, poses: Option<&str>, ambient: Option<&Image>) -> Result<String> {
     let mut meta = hash_file(&recording.folder.join("meta.json"))?;
     if let Some(name) = &recording.meta.frames_file {

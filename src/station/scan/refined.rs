@@ -1,6 +1,6 @@
-//! In: the working folder of a scan whose last shot is done. Out: cloud and shots without what the reported places scatter by, and without
-//! what the sheet's thickness does where brightness changes, as far as the surface shows both; what was measured waits beside them until the
-//! scan has its names.
+//! In: the working folder of a scan whose last shot is done. Out: cloud and shots without what the reported places
+//! scatter by, and without what the sheet's thickness does where brightness changes, as far as the surface shows
+//! both; what was measured waits beside them until the scan has its names.
 //! Frame and unit: the cloud's frame, mm.
 
 use super::scan_folder::{CLOUD_FILE, MEASURED};

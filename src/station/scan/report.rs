@@ -1,4 +1,5 @@
-//! In: a scan folder. Out: what the scan came to, as scan.json holds it, and its points; both only as they were written.
+//! In: a scan folder. Out: what the scan came to, as scan.json holds it, and its points; both only as they were
+//! written.
 //! Frame and unit: cloud in the frame that the report names, mm (docs/file-formats.md).
 
 use super::scan_folder::settle;
@@ -65,7 +66,8 @@ pub struct ScanReport {
     /// How the places scatter that the robot or the axis reported, where a surface shows it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub places: Option<PathFound>,
-    /// How thick the sheet is where brightness changes, where the cloud shows it; what that does is taken out of the points.
+    /// How thick the sheet is where brightness changes, where the cloud shows it; what that does is taken out of the
+    /// points.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sheet: Option<SheetFound>,
     /// Pixels of the sensor that shine by themselves; their neighbours stood for them.
@@ -250,8 +252,9 @@ pub fn shots_of(scan: &Path) -> Result<Shots> {
     Ok(shots.with_stripe(report.stripe.map(|s| s.width_px)))
 }
 
-/// The points of a finished scan where the sheet's middle meets the rays of their light, checked as those of [`cloud_of`]: what finds a part's edges
-/// in them takes the sheet to be thick ([`crate::scan::Thick`] has moved them off it).
+/// The points of a finished scan where the sheet's middle meets the rays of their light, checked as those of
+/// [`cloud_of`]: what finds a part's edges in them takes the sheet to be thick ([`crate::scan::Thick`] has moved them
+/// off it).
 pub fn lit_cloud_of(scan: &Path) -> Result<Vec<CloudPoint>> {
     let mut cloud = cloud_of(scan)?;
     if load_report(scan)?.sheet.is_some() {

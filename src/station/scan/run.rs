@@ -1,6 +1,7 @@
 //! In: a source of shots, a calibrated rig, an output folder. Out: the scan folder — cloud, height
 //! map, overlays, figures — written so that whatever ends it costs nothing that was done.
-//! Frame and unit: cloud in the frame of what moved (mostly the robot's base), height map in its grid frame; mm (docs/file-formats.md).
+//! Frame and unit: cloud in the frame of what moved (mostly the robot's base), height map in its grid frame; mm
+//! (docs/file-formats.md).
 
 use super::overlays::Overlays;
 use super::progress::{Checkpoint, fingerprint_of};
@@ -71,10 +72,11 @@ pub fn scan(
     scan_on(|| options.place.open(), id, label, open, rig, options, progress)
 }
 
-/// Runs a scan from the first shot to the last file. `processor` is asked for once the source is open; `id` names the recording (a hash of its
-/// meta.json, poses and ambient picture), so that a resumed scan cannot continue another one; `open` gives the source
-/// from a shot on; `progress` is told (shots done, shots in all). Whatever ends it early, the shots that were done stay
-/// done and the next run can resume there; a former scan in the folder stays until this one is whole.
+/// Runs a scan from the first shot to the last file. `processor` is asked for once the source is open; `id` names the
+/// recording (a hash of its meta.json, poses and ambient picture), so that a resumed scan cannot continue another
+/// one; `open` gives the source from a shot on; `progress` is told (shots done, shots in all). Whatever ends it
+/// early, the shots that were done stay done and the next run can resume there; a former scan in the folder stays
+/// until this one is whole.
 pub fn scan_on(
     processor: impl FnOnce() -> Result<Processor>,
     id: &str,
@@ -127,7 +129,7 @@ fn state(id: &str, rig: &Rig, options: &ScanOptions, part: &Path) -> Result<Chec
             .next("scan again without --resume, or into another folder")),
         None if options.resume && options.out.join(FORMER_PROGRESS).exists() => {
             Err(Fault::usage(format!("{}: a former version was interrupted here", options.out.display()))
-                .cause("this version keeps what is unfinished in another way and cannot go on with it")
+                .cause("this version stores unfinished scans in another format and cannot continue it")
                 .next("scan again without --resume: the pictures are still there"))
         }
         None => Ok(Checkpoint::new(identity)),

@@ -1,5 +1,5 @@
-//! In: a folder that a scan writes into or was written into. Out: its working folder, its files' names, and the rule that it
-//! holds one scan, whole.
+//! In: a folder that a scan writes into or was written into. Out: its working folder, its files' names, and the rule
+//! that it holds one scan, whole.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
@@ -8,8 +8,8 @@ use crate::scan::SHOTS_FILE;
 use std::io::Result as Io;
 use std::path::Path;
 
-/// Everything that a scan leaves in its folder, and what is made of it there; the report first, because without it the rest
-/// is no scan.
+/// Everything that a scan leaves in its folder, and what is made of it there; the report first, because without it
+/// the rest is no scan.
 const FILES: [&str; 21] = [
     "scan.json",
     "index.html",
@@ -35,7 +35,8 @@ const FILES: [&str; 21] = [
     "found.json",
 ];
 pub(super) const CLOUD_FILE: &str = "cloud.ply";
-/// Cloud and shots as measured, in the working folder, under the names of those that are not done: an interrupted scan goes on with these.
+/// Cloud and shots as measured, in the working folder, under the names of those that are not done: an interrupted
+/// scan goes on with these.
 pub(super) const MEASURED: [&str; 2] = ["cloud.ply.part", "shots.jsonl.part"];
 /// How far a scan of a former version got.
 pub(super) const FORMER_PROGRESS: &str = "scan.progress.json";
@@ -82,12 +83,12 @@ pub(in crate::station) fn make(out: &Path) -> Result<()> {
         if out.join(file).exists() {
             return Err(Fault::usage(format!("{}: is {what}, it has a {file}", out.display()))
                 .cause("the folder of the results was exchanged with another")
-                .next("give the scan a folder of its own"));
+                .next("give the scan a separate folder"));
         }
     }
     if out.join("scan.part").is_symlink() {
         return Err(Fault::output(format!("{}: scan.part is a link", out.display()))
-            .cause("somebody else made it; what it points at is left alone")
+            .cause("it was not made by this program; its target is not touched")
             .next("take it away, or choose another folder"));
     }
     crate::files::make_folder(out)

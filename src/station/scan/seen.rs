@@ -96,7 +96,8 @@ impl Seen {
             b.map_or("nowhere".into(), |[x0, y0, x1, y1]| format!("in columns {x0} to {x1}, rows {y0} to {y1}"))
         };
         format!(
-            "in {} pictures the median level is {}, the brightest {} of {}, up to {:.1} % of the pixels are saturated; the \
+            "in {} pictures the median level is {}, the brightest {} of {}, up to {:.1} % of the pixels are \
+             saturated; the \
              light lies {}, the laser plane is looked for {}",
             self.pictures,
             self.median_level,
@@ -128,11 +129,13 @@ impl Seen {
         } else if apart {
             (
                 "the light lies where the laser plane is not within the working volume",
-                "compare working_volume in station.toml and the laser plane with the station; is the picture mirrored or turned?",
+                "compare working_volume in station.toml and the laser plane with the station; is the picture \
+                 mirrored or turned?",
             )
         } else {
             (
-                "what light there is makes no stripe as the settings ask for: too wide, too faint, or broken into specks",
+                "what light there is makes no stripe as the settings ask for: too wide, too faint, or broken into \
+                 specks",
                 "look at the overlays, then at [extraction] in station.toml",
             )
         }

@@ -1,4 +1,5 @@
-//! In: the points of a cloud as they come. Out: the median of the standard deviations that they carry, in memory that does not grow.
+//! In: the points of a cloud as they come. Out: the median of the standard deviations that they carry, in memory that
+//! does not grow.
 //! Frame and unit: mm.
 
 use crate::scan::CloudPoint;

@@ -1,4 +1,5 @@
-//! In: finished profiles of a running scan. Out: the same to somebody who looks on, e.g. a screen; never slower than the looker.
+//! In: finished profiles of a running scan. Out: the same to somebody who looks on, e.g. a screen; never slower than
+//! the looker.
 //! Frame and unit: points in the cloud's frame, mm; `up` is a unit vector in it.
 
 use crate::geometry::Vec3;

@@ -1,4 +1,5 @@
-//! In: a listener, a session. Out: one robot's program at a time, a line for each of its lines; whoever comes meanwhile is told so.
+//! In: a listener, a session. Out: one robot's program at a time, a line for each of its lines; whoever comes
+//! meanwhile is told so.
 //! Frame and unit: bytes, lines end with LF, CR or both, answers with LF; s.
 
 use super::session::Session;
@@ -127,8 +128,8 @@ fn ended(mut stream: &TcpStream, wrong: &Wrong) -> String {
     answer
 }
 
-/// A connection closed with bytes unread is reset, and a reset overtakes what was said [rfc1122 4.2.2.13]: the rest is read,
-/// for a moment.
+/// A connection closed with bytes unread is reset, and a reset overtakes what was said [rfc1122 4.2.2.13]: the rest
+/// is read, for a moment.
 fn let_it_be_read(mut stream: &TcpStream) {
     let (begun, mut rest) = (Instant::now(), [0u8; 1024]);
     let _ = stream.shutdown(Shutdown::Write);

@@ -1,4 +1,5 @@
-//! In: requests of a robot's program, one after the other; a camera, a station, recipes. Out: what is done about each, and its answer.
+//! In: requests of a robot's program, one after the other; a camera, a station, recipes. Out: what is done about
+//! each, and its answer.
 //! Frame and unit: base_from_flange as the notation has it, mm here; tool 0 and work frame 0 on the controller.
 
 use super::words::{self, Code, Of, Request, Which, Wrong};
@@ -75,8 +76,8 @@ impl Session {
         let format = camera.format();
         rig.need_camera()?.same_pictures([format.width, format.height], camera.readout().as_ref())?;
         if !options.recipes.is_dir() {
-            return Err(Fault::usage(format!("{}: is no folder of recipes", options.recipes.display()))
-                .next("give the folder in which NAME.toml lies for each FIND NAME"));
+            return Err(Fault::usage(format!("{}: is not a folder of recipes", options.recipes.display()))
+                .next("give the folder that contains NAME.toml for each FIND NAME"));
         }
         crate::files::make_folder(&options.out)?;
         let camera = Snapshots::new(camera);
@@ -136,7 +137,7 @@ impl Session {
         if !(BELIEVED_MM[0]..=BELIEVED_MM[1]).contains(&far) {
             let [least, most] = BELIEVED_MM;
             let what =
-                format!("the flange would be {far:.3} mm from its base, {least} to {most} are believed: another unit?");
+                format!("the flange would be {far:.3} mm from its base, {least} to {most} are accepted: another unit?");
             return Err(Wrong::new(Code::Numbers, what));
         }
         let (angle, mm) = at.difference(&scan.last);
@@ -147,7 +148,7 @@ impl Session {
         if scan.shots >= MOST_SHOTS {
             return Err(Wrong::new(
                 Code::Order,
-                format!("{MOST_SHOTS} shots are taken, no more fit: FIND, or SCAN anew"),
+                format!("{MOST_SHOTS} shots are taken, no more fit: FIND, or SCAN again"),
             ));
         }
         let asked = Instant::now();

@@ -85,8 +85,8 @@ impl Wrong {
     }
 }
 
-/// Reads a request. Words may be in small letters; what parts numbers may be blanks, commas, semicolons or the brackets that UR and
-/// ABB write around their poses (`p[0.1, ...]`, `[1,2,3],[...]`).
+/// Reads a request. Words may be in small letters; what parts numbers may be blanks, commas, semicolons or the
+/// brackets that UR and ABB write around their poses (`p[0.1, ...]`, `[1,2,3],[...]`).
 ///
 /// # Errors
 /// What is wrong, in a few words.
@@ -109,7 +109,7 @@ pub fn read(line: &str) -> Result<Request, Wrong> {
         "" => Err(Wrong::new(Code::Word, "an empty line")),
         _ => Err(Wrong::new(
             Code::Word,
-            format!("'{}' is no word; HELLO, STATUS, SCAN, POSE, FIND, GIVE and BYE are", shown(word)),
+            format!("'{}' is not a word; HELLO, STATUS, SCAN, POSE, FIND, GIVE and BYE are", shown(word)),
         )),
     }
 }
@@ -119,7 +119,7 @@ fn numbers(text: &str) -> Result<Vec<f64>, Wrong> {
     let parts = |c: char| c.is_whitespace() || matches!(c, ',' | ';' | '[' | ']' | '(' | ')');
     let read = |word: &str| match word.parse::<f64>() {
         Ok(x) if x.is_finite() => Ok(x),
-        _ => Err(Wrong::new(Code::Numbers, format!("'{}' is no number", shown(word)))),
+        _ => Err(Wrong::new(Code::Numbers, format!("'{}' is not a number", shown(word)))),
     };
     text.split(parts).filter(|w| !w.is_empty()).map(read).collect()
 }
@@ -132,7 +132,7 @@ fn recipe(name: &str) -> Result<String, Wrong> {
     }
     Err(Wrong::new(
         Code::Word,
-        format!("'{}' is no name of a recipe: 1 to 40 letters, digits, - and _ are", shown(name)),
+        format!("'{}' is not a recipe's name: 1 to 40 letters, digits, - and _ are", shown(name)),
     ))
 }
 
@@ -215,7 +215,8 @@ mod tests {
 
     proptest! {
         #[test]
-        fn whatever_comes_is_read_or_answered_by_one_plain_line(line in "\\PC{0,80}|(pose|find|give|scan) [\\x00-\\x7f]{0,60}") {
+        fn whatever_comes_is_read_or_answered_by_one_plain_line(line in "\\PC{0,80}|(pose|find|give|scan) \
+            [\\x00-\\x7f]{0,60}") {
             let answer = match read(&line) {
                 Ok(_) => yes("1"),
                 Err(wrong) => no(&wrong),

@@ -64,8 +64,8 @@ impl Sigmas {
                 "the sigma of the {what} is {} {unit}, above 0 and up to {MOST} are allowed",
                 s.expect("just found")
             ))
-            .cause("nothing is known exactly, and what is off by more than that is no calibration")
-            .next("state one standard deviation, or leave it out: then a usual one is assumed")),
+            .cause("no value is exact, and a larger error is not a calibration")
+            .next("state one standard deviation, or omit it: then a usual one is assumed")),
             None => Ok(()),
         }
     }

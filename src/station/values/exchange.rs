@@ -58,9 +58,12 @@ impl Values {
     pub fn load(path: &Path) -> Result<Values> {
         let text = crate::files::read_text(path)?;
         serde_json::from_str(&text).map_err(|e| {
-            Fault::input(format!("{}: holds no rig values: {e}", path.display()))
+            Fault::input(format!("{}: contains no rig values: {e}", path.display()))
                 .cause(crate::files::slip_in(&text, e.line(), "not JSON, or an entry of another shape"))
-                .next("use the keys intrinsics, flange_T_camera, laser_plane_camera, pointer_camera, base_T_camera, linear_axis, turntable of docs/file-formats.md")
+                .next(
+                    "use the keys intrinsics, flange_T_camera, laser_plane_camera, pointer_camera, base_T_camera, \
+                       linear_axis, turntable of docs/file-formats.md",
+                )
         })
     }
 
@@ -83,9 +86,9 @@ impl Values {
         }
     }
 
-    /// Makes each value a calibration, naming `source` as its input, and stores all of them or none. Camera, laser plane and
-    /// the camera's place have the covariance that `sigmas` says, others an unknown one. What looks like another unit is
-    /// refused unless it is so `as_stated`. Returns what was stored.
+    /// Makes each value a calibration, naming `source` as its input, and stores all of them or none. Camera, laser
+    /// plane and the camera's place have the covariance that `sigmas` says, others an unknown one. What looks like
+    /// another unit is refused unless it is so `as_stated`. Returns what was stored.
     pub fn store(&self, station: &Path, source: &Path, as_stated: bool, sigmas: &Sigmas) -> Result<Vec<Kind>> {
         sigmas.check()?;
         let camera = self
@@ -145,9 +148,12 @@ impl Values {
                 .store_all(station)
                 .map_err(|e| e.at(source.display()).next("correct the file; nothing was imported of it"))?;
         if stored.is_empty() {
-            return Err(Fault::input(format!("{}: holds none of the rig's values", source.display()))
+            return Err(Fault::input(format!("{}: contains no values of a rig", source.display()))
                 .cause("another kind of JSON file")
-                .next("use the keys intrinsics, flange_T_camera, laser_plane_camera, pointer_camera, base_T_camera, linear_axis, turntable"));
+                .next(
+                    "use the keys intrinsics, flange_T_camera, laser_plane_camera, pointer_camera, base_T_camera, \
+                       linear_axis, turntable",
+                ));
         }
         Ok(stored)
     }
@@ -166,7 +172,7 @@ fn unit(key: &str, v: [f64; 3]) -> Result<(Vec3, Option<String>)> {
     let length = v.norm();
     if !((length - 1.0).abs() <= ROUNDED) {
         return Err(Fault::input(format!("{key} is {length:.6} long, it must be 1 to {ROUNDED}"))
-            .cause("edited by hand, or a vector that is no direction; an offset beside it cannot be understood")
+            .cause("edited by hand, or a vector that is not a direction")
             .next("give a direction of unit length, and the plane's offset along it"));
     }
     let note = ((length - 1.0).abs() > 1e-6).then(|| format!("{key} was {length:.6} long and is taken as a direction"));

@@ -1,4 +1,5 @@
-//! In: what a procedure came to. Out: an HTTP answer; work that waits for the disk runs beside the server's own threads.
+//! In: what a procedure came to. Out: an HTTP answer; work that waits for the disk runs beside the server's own
+//! threads.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Kind, Result};

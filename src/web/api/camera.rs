@@ -1,4 +1,5 @@
-//! In: the number of the picture that a page shows. Out: the newest other one with its peaks, as soon as there is one; a part over it.
+//! In: the number of the picture that a page shows. Out: the newest other one with its peaks, as soon as there is
+//! one; a part over it.
 //! Frame and unit: px, grey levels of 8 bits, ms; numbers little endian.
 
 use super::answer::{Answer, body, json, operates};
@@ -70,8 +71,8 @@ pub async fn look_back(State(screen): State<Arc<Screen>>, Query(ask): Query<Pict
     json(screen, move |s| recorded(s, &ask).map(|image| PictureLook::from(&look(&image)))).await
 }
 
-/// GET /camera/newest?after=: number, columns, rows, number of peaks (u32), delay in ms (float), then u, v (float) and fate (u32) of
-/// each peak, then the grey levels; 204 where none came within a second.
+/// GET /camera/newest?after=: number, columns, rows, number of peaks (u32), delay in ms (float), then u, v (float)
+/// and fate (u32) of each peak, then the grey levels; 204 where none came within a second.
 pub async fn newest(State(screen): State<Arc<Screen>>, Query(ask): Query<After>) -> Answer<Response> {
     let camera = camera(&screen)?;
     Ok(match camera.next(ask.after, LONGEST).await {

@@ -31,13 +31,13 @@ fn the_api_is_described_with_the_numbers_that_it_keeps() {
         "docs/api.md",
         include_str!("../../../docs/api.md"),
         &[
-            format!("falls free after {} s without a request", IDLE.as_secs()),
+            format!("It expires after {} s without a request", IDLE.as_secs()),
             format!("redeems it once, {} to {} s later", HELD.as_secs_f64(), LONGEST.as_secs_f64()),
-            format!("at least once {};", spoken(SILENCE)),
-            format!("413 longer than {} MiB", MOST_BODY >> 20),
+            format!("at least once {}.", spoken(SILENCE)),
+            format!("| 413 | longer than {} MiB |", MOST_BODY >> 20),
             format!("in {PIECES} pieces along it"),
-            format!("at most {} ms before it was asked for", FRESH / 1_000_000),
-            format!("204 where none came within {}", spoken(camera::LONGEST)),
+            format!("at most {} ms before the request", FRESH / 1_000_000),
+            format!("204 if none arrived within {}", spoken(camera::LONGEST)),
         ],
     );
     assert_eq!((MOST_BODY % (1 << 20), FRESH % 1_000_000), (0, 0));
@@ -49,10 +49,10 @@ fn operators_are_told_the_numbers_that_the_screen_keeps() {
         "docs/operator.md",
         include_str!("../../../docs/operator.md"),
         &[
-            format!("{} without a touch lets it go", spoken(IDLE)),
-            format!("After {} under the finger", spoken(HELD)),
-            format!("a lost network and {} of silence", spoken(SILENCE)),
-            format!("each laser and the lamp light for {}", spoken(LIT)),
+            format!("After {} without a touch it is released", spoken(IDLE)),
+            format!("Hold the button for {}", spoken(HELD)),
+            format!("a lost network, or {} of silence", spoken(SILENCE)),
+            format!("each laser and the lamp on for {}", spoken(LIT)),
         ],
     );
 }

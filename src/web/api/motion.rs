@@ -1,4 +1,5 @@
-//! In: a robot to arm, a button that goes down over a motion that is shown, is held, is let go. Out: that motion, once; or why not.
+//! In: a robot to arm, a button that goes down over a motion that is shown, is held, is let go. Out: that motion,
+//! once; or why not.
 //! Frame and unit: motions by their hash.
 
 use super::answer::{Answer, afterwards, body, json, operates};

@@ -1,4 +1,5 @@
-//! In: the table of routes, the messages' declarations. Out: their description in OpenAPI 3.1; docs/openapi.json is this.
+//! In: the table of routes, the messages' declarations. Out: their description in OpenAPI 3.1; docs/openapi.json is
+//! this.
 //! Frame and unit: none.
 
 use super::routes::{ROOT, Route, routes};
@@ -17,9 +18,9 @@ pub fn openapi() -> Value {
         "info": {
             "title": "sheetlight station",
             "version": "1",
-            "description": "The operator's screen. Messages are declared in docs/messages.d.ts. Every request carries a session's \
-                            cookie or 'Authorization: Bearer TOKEN', and 'X-Sheetlight-Tab' with a name of the caller's own where \
-                            it operates. Faults: {\"error\": Problem}.",
+            "description": "The operator's screen. Messages are declared in docs/messages.d.ts. Every request \
+                            carries a session's cookie or 'Authorization: Bearer TOKEN', and 'X-Sheetlight-Tab' \
+                            with a name of the caller's own where it operates. Faults: {\"error\": Problem}.",
             "license": { "name": "MIT OR Apache-2.0" },
         },
         "paths": paths,
@@ -34,7 +35,10 @@ pub fn openapi() -> Value {
 fn operation(r: &Route) -> Value {
     let names = r.path.split('/').filter_map(|w| w.strip_prefix('{')?.strip_suffix('}'));
     let mut parameters: Vec<Value> = names
-        .map(|n| json!({ "name": n.trim_start_matches('*'), "in": "path", "required": true, "schema": { "type": "string" } }))
+        .map(|n| {
+            json!({ "name": n.trim_start_matches('*'), "in": "path", "required": true,
+            "schema": { "type": "string" } })
+        })
         .collect();
     if let Some(message) = r.takes.strip_prefix('?') {
         parameters
@@ -55,7 +59,8 @@ fn operation(r: &Route) -> Value {
             None => ("application/json", json!({ "type": "object", "x-message": name })),
         },
     };
-    let fault = json!({ "description": "a fault", "content": { "application/json": { "schema": { "x-message": "Problem" } } } });
+    let problem = json!({ "schema": { "x-message": "Problem" } });
+    let fault = json!({ "description": "a fault", "content": { "application/json": problem } });
     let mut out = json!({
         "summary": r.does,
         "parameters": parameters,

@@ -92,7 +92,7 @@ fn of_station() -> Vec<Route> {
         route(("GET", "/settings"), "Settings and backups", ("", "SettingsState"), get(settings::state)),
         route(
             ("PUT", "/settings"),
-            "Change settings; the former ones are backed up",
+            "Change settings; the previous ones are backed up",
             ("SettingsAsk", "SettingsState"),
             put(settings::change),
         )

@@ -99,7 +99,8 @@ pub struct Who {
     tab: String,
 }
 
-/// GET /events: the WebSocket. A tab that holds the button says `held GRANT` over it; its end halts what that tab moves.
+/// GET /events: the WebSocket. A tab that holds the button says `held GRANT` over it; its end halts what that tab
+/// moves.
 pub async fn events(
     State(screen): State<Arc<Screen>>,
     Extension(asks): Extension<Tab>,
@@ -107,7 +108,7 @@ pub async fn events(
     upgrade: WebSocketUpgrade,
 ) -> Answer<Response> {
     let Some(seat) = screen.hub.sit() else {
-        let fault = Fault::refused("64 browsers look on already").next("close one of them");
+        let fault = Fault::refused("64 browsers are connected already").next("close one of them");
         return Err(Refusal(StatusCode::SERVICE_UNAVAILABLE, fault));
     };
     let hub = screen.hub.clone();

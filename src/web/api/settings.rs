@@ -1,4 +1,5 @@
-//! In: questions about the station's settings, changes of them, backups, outputs to try. Out: the settings as they stand then.
+//! In: questions about the station's settings, changes of them, backups, outputs to try. Out: the settings as they
+//! stand then.
 //! Frame and unit: as the settings.
 
 use super::answer::{Answer, beside, body, json, operates};

@@ -1,4 +1,5 @@
-//! In: the station, its jobs, this machine. Out: a file for somebody who helps: logs and settings; pictures only where somebody ticked that.
+//! In: the station, its jobs, this machine. Out: a file for somebody who helps: logs and settings; pictures only
+//! where somebody ticked that.
 //! Frame and unit: px; base64 of PNG.
 
 use super::answer::{Answer, beside};

@@ -80,7 +80,7 @@ fn values<'a>(map: &'a HeightMap, layer: &str) -> Result<&'a [f32]> {
         "height" => Ok(&map.z),
         "sigma" => Ok(&map.sigma),
         "intensity" => Ok(&map.intensity),
-        other => Err(Fault::usage(format!("{other:?} is no layer")).next("height, sigma or intensity")),
+        other => Err(Fault::usage(format!("{other:?} is not a layer")).next("height, sigma or intensity")),
     }
 }
 
@@ -119,8 +119,8 @@ fn usual() -> usize {
 /// Most points that are sent: 40 MB.
 const MOST_POINTS: usize = 2_000_000;
 
-/// GET /scans/{id}/points?most=: points in the cloud and sent (u32 each), origin (3 doubles), then x y z sigma_mm intensity of
-/// each as floats; every share from the start on covers the whole scan.
+/// GET /scans/{id}/points?most=: points in the cloud and sent (u32 each), origin (3 doubles), then x y z sigma_mm
+/// intensity of each as floats; every share from the start on covers the whole scan.
 pub async fn points(
     State(screen): Shared,
     UrlPath(id): UrlPath<String>,

@@ -1,4 +1,5 @@
-//! In: questions about a sweep that was not made yet, and about places that were found again and again. Out: the plan, the repeats.
+//! In: questions about a sweep that was not made yet, and about places that were found again and again. Out: the
+//! plan, the repeats.
 //! Frame and unit: mm, degrees.
 
 use super::answer::{Answer, body, json};

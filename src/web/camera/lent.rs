@@ -1,4 +1,5 @@
-//! In: an opened camera, a job. Out: that camera for the job; its pictures are shown, what it is set to is kept, and it is given back.
+//! In: an opened camera, a job. Out: that camera for the job; its pictures are shown, what it is set to is kept, and
+//! it is given back.
 //! Frame and unit: as its pictures and features.
 
 use super::state::{Looked, State, Use, lock};

@@ -34,8 +34,8 @@ impl Looked {
         Looked { number, image, peaks, delay_ms, came_ns, bytes: OnceLock::new() }
     }
 
-    /// Number, columns, rows, number of peaks (u32), delay in ms (float), then u, v (float) and fate (u32) of each peak, then the grey
-    /// levels; written once for all who look.
+    /// Number, columns, rows, number of peaks (u32), delay in ms (float), then u, v (float) and fate (u32) of each
+    /// peak, then the grey levels; written once for all who look.
     pub fn bytes(&self) -> Bytes {
         self.bytes.get_or_init(|| self.written().into()).clone()
     }

@@ -1,5 +1,6 @@
-//! In: a camera's URI, the station's rig. Out: the newest picture with its peaks by fate, and how long that took; pictures that came
-//! meanwhile are passed over and counted. A job that moves the robot borrows the camera: its pictures are shown then.
+//! In: a camera's URI, the station's rig. Out: the newest picture with its peaks by fate, and how long that took;
+//! pictures that came meanwhile are passed over and counted. A job that moves the robot borrows the camera: its
+//! pictures are shown then.
 //! Frame and unit: px of the picture, grey levels of 8 bits, ms.
 
 use super::lent::Lent;
@@ -36,8 +37,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Begins to look; the camera need not be there yet. `raw` states what frames on standard input are like. Errors: a URI that
-    /// names no camera, no threads.
+    /// Begins to look; the camera need not be there yet. `raw` states what frames on standard input are like. Errors:
+    /// a URI that names no camera, no threads.
     pub fn watch(uri: &str, raw: Option<RawFormat>, station: &Path) -> Result<Camera> {
         let parsed: CameraUri =
             uri.parse().map_err(|e: String| Fault::usage(e).next("name a camera as docs/live.md shows"))?;
@@ -71,8 +72,8 @@ impl Camera {
         Ok(Camera { uri, state, ended, use_ })
     }
 
-    /// The camera for a job that asks for each picture, until what is given back is dropped; nobody else looks through it meanwhile,
-    /// what it takes is shown.
+    /// The camera for a job that asks for each picture, until what is given back is dropped; nobody else looks
+    /// through it meanwhile, what it takes is shown.
     ///
     /// # Errors
     /// It is not there, is lent already, or is a pipe.
@@ -115,12 +116,14 @@ impl Camera {
         self.use_.renewed.store(true, Ordering::SeqCst);
     }
 
-    /// A job runs: pictures are measured where somebody looks alone, and on a thread of their own, so that the job has all others.
+    /// A job runs: pictures are measured where somebody looks alone, and on a thread of their own, so that the job
+    /// has all others.
     pub fn make_way(&self, busy: bool) {
         self.use_.busy.store(busy, Ordering::SeqCst);
     }
 
-    /// The next picture other than the one of this number, waited for at most so long; while a job runs one that is fresh, where one comes.
+    /// The next picture other than the one of this number, waited for at most so long; while a job runs one that is
+    /// fresh, where one comes.
     pub async fn next(&self, number: u64, within: Duration) -> Option<Arc<Looked>> {
         let (asked, until) = (now_ns(), tokio::time::Instant::now() + within);
         loop {
@@ -164,7 +167,7 @@ impl Camera {
         let state = lock(&self.state);
         let a = &state.account;
         let dropped = [
-            ("passed over: a newer one came", a.dropped_processing),
+            ("skipped: a newer one came", a.dropped_processing),
             ("no stripe", state.without_stripe),
             ("nobody looked while a job ran", state.unlooked),
             ("incomplete", a.incomplete),

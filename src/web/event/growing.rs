@@ -1,4 +1,5 @@
-//! In: the profiles of a running scan. Out: its height map as it grows: a row a shot (or a few), a column a piece of the stripe.
+//! In: the profiles of a running scan. Out: its height map as it grows: a row a shot (or a few), a column a piece of
+//! the stripe.
 //! Frame and unit: heights towards the camera at the first shot, mm; rows in the order of the shots.
 
 use crate::geometry::Vec3;
@@ -82,8 +83,8 @@ impl Growing {
         (rows.job, rows.done)
     }
 
-    /// Rows from `from` on, little endian: "GROW", job, columns, rows in all, first row, number of rows, then their heights
-    /// as floats, NaN where nothing was seen. `None` where there is nothing new.
+    /// Rows from `from` on, little endian: "GROW", job, columns, rows in all, first row, number of rows, then their
+    /// heights as floats, NaN where nothing was seen. `None` where there is nothing new.
     pub fn message(&self, from: usize) -> Option<Vec<u8>> {
         let rows = self.rows();
         if rows.done <= from {

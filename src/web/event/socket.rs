@@ -17,8 +17,9 @@ const PATIENCE: Duration = Duration::from_secs(20);
 /// Rows of the growing map are sent this often at most.
 const PICTURE: Duration = Duration::from_millis(250);
 
-/// Serves one viewer until it goes. `state` is asked for at first and whenever events were missed, beside the server's own threads: it
-/// looks at the disk. `hears` gets what the viewer says, in a task of its own: however long telling takes, a button that is held is heard.
+/// Serves one viewer until it goes. `state` is asked for at first and whenever events were missed, beside the
+/// server's own threads: it looks at the disk. `hears` gets what the viewer says, in a task of its own: however long
+/// telling takes, a button that is held is heard.
 pub async fn stream(
     socket: WebSocket,
     hub: Arc<Hub>,
@@ -63,7 +64,8 @@ async fn told(
     }
 }
 
-/// Hears the viewer until it goes. All that viewers say here is that a button is held; what they order goes through the API.
+/// Hears the viewer until it goes. All that viewers say here is that a button is held; what they order goes through
+/// the API.
 async fn heard(mut viewer: SplitStream<WebSocket>, hears: impl Fn(&str) + Send) {
     while let Some(Ok(message)) = viewer.next().await {
         match message {

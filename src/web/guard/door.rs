@@ -26,8 +26,10 @@ pub struct Door {
 }
 
 /// Scripts, styles, pictures and connections from here alone, no frames, no plugins, no inline code.
-const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
-                      font-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
+                      connect-src 'self'; \
+                      font-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors \
+                      'none'";
 
 const HEADERS: [(HeaderName, &str); 6] = [
     (header::CONTENT_SECURITY_POLICY, POLICY),
@@ -58,7 +60,8 @@ pub async fn door(
                 None if open => next.run(request).await,
                 None => refusal(
                     StatusCode::UNAUTHORIZED,
-                    "no session: open the address that the program printed when it was started; one of a former start is no good",
+                    "not signed in: open the address printed by the running server; addresses from earlier runs no \
+                     longer work",
                 ),
             }
         }

@@ -35,8 +35,8 @@ struct Held {
 pub struct Leases(Mutex<Option<Held>>);
 
 impl Leases {
-    /// Takes it, or renews it. Refused while another tab holds it, unless `firmly`: a person at the machine may take it over.
-    /// Says whether it came from elsewhere: it was another tab's, or nobody's any more.
+    /// Takes it, or renews it. Refused while another tab holds it, unless `firmly`: a person at the machine may take
+    /// it over. Says whether it came from elsewhere: it was another tab's, or nobody's any more.
     pub fn take(&self, tab: &Tab, firmly: bool) -> Result<bool> {
         let mut held = self.0.lock().unwrap_or_else(|e| e.into_inner());
         match &*held {

@@ -18,12 +18,12 @@ pub fn plain(word: &str) -> bool {
         && word.chars().all(|c| c.is_alphanumeric() || " ._-+()".contains(c))
 }
 
-/// The path of something that is there under `root`. Refuses names with `..`, absolute ones, NUL and other marks, and links
-/// that lead out; the refusal says nothing of what lies outside.
+/// The path of something that is there under `root`. Refuses names with `..`, absolute ones, NUL and other marks, and
+/// links that lead out; the refusal says nothing of what lies outside.
 pub fn resolve(root: &Path, name: &str) -> Result<PathBuf> {
     let words: Vec<&str> = name.split('/').collect();
     if words.len() > DEEPEST || !words.iter().all(|w| plain(w)) {
-        return Err(Fault::usage(format!("{name:?} is no name here"))
+        return Err(Fault::usage(format!("{name:?} is an invalid file name"))
             .cause("names have letters, digits, blanks and . _ - + ( ), no folder above, at most 6 folders")
             .next("take one from the list"));
     }

@@ -14,7 +14,7 @@ const LONGEST: usize = 256;
 pub fn hashed(password: &str) -> Result<String> {
     let length = password.chars().count();
     if !(SHORTEST..=LONGEST).contains(&length) {
-        return Err(Fault::usage(format!("the password has {length} characters, {SHORTEST} to {LONGEST} are wanted"))
+        return Err(Fault::usage(format!("the password has {length} characters, {SHORTEST} to {LONGEST} are needed"))
             .next("choose another one, e.g. four words"));
     }
     let salt = SaltString::encode_b64(&rand::random::<[u8; 16]>()).expect("16 bytes are a salt");
@@ -27,7 +27,7 @@ pub fn hashed(password: &str) -> Result<String> {
 /// Whether `password` is that of the hash; errors where the hash is none.
 pub fn verify(password: &str, hash: &str) -> Result<bool> {
     let parsed = PasswordHash::new(hash.trim()).map_err(|e| {
-        Fault::input(format!("the password file holds no Argon2 hash: {e}"))
+        Fault::input(format!("the password file contains no Argon2 hash: {e}"))
             .cause("another file, or the password itself")
             .next("make one with sheetlight station password --out FILE")
     })?;

@@ -1,5 +1,6 @@
 //! In: nothing. Out: a camera's settings and what its pictures show, as pages see them.
-//! Frame and unit: features by their standard names (ExposureTime in us); px; shares of full scale and of the stripe's length.
+//! Frame and unit: features by their standard names (ExposureTime in us); px; shares of full scale and of the
+//! stripe's length.
 
 use crate::capture::{Feature, Look, Range, Value, WANTED};
 use serde::{Deserialize, Serialize};
@@ -84,7 +85,8 @@ pub struct StripeSeen {
     pub dark: f64,
     /// Exposure is right.
     pub right: bool,
-    /// The same in pieces along it, from the left or the top: peak, width in px, contrast, dark share; the first three are 0 where it is dark.
+    /// The same in pieces along it, from the left or the top: peak, width in px, contrast, dark share; the first
+    /// three are 0 where it is dark.
     pub pieces: Vec<[f64; 4]>,
 }
 

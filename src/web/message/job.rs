@@ -25,7 +25,8 @@ pub enum JobState {
 }
 
 /// What to do where the disk is full.
-const MAKE_ROOM: &str = "take old jobs away on the page Replay (the × behind each), or free space otherwise; then resume this job, or order it again";
+const MAKE_ROOM: &str = "take old jobs away on the page Replay (the × behind each), or free space otherwise; then \
+                         resume this job, or order it again";
 
 /// A fault as pages show it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, TS)]

@@ -1,4 +1,5 @@
-//! In: nothing. Out: what server and pages say to each other, one type a message; the pages' declarations are made from these.
+//! In: nothing. Out: what server and pages say to each other, one type a message; the pages' declarations are made
+//! from these.
 //! Frame and unit: lengths in mm, angles in degrees, times in UTC, RFC 3339; each name shows another unit.
 
 mod bar;

@@ -1,4 +1,5 @@
-//! In: nothing. Out: what pages see of a robot that may be moved: who armed it, the motion that waits for a person, what was said.
+//! In: nothing. Out: what pages see of a robot that may be moved: who armed it, the motion that waits for a person,
+//! what was said.
 //! Frame and unit: base frame; mm, degrees as the labels say, mm/s, s.
 
 use super::GateLight;

@@ -26,7 +26,8 @@ pub enum Order {
     Tune(Plain),
     /// A calibration from a recording; it is stored when it is accepted.
     Calibrate(CalibrateOrder),
-    /// Camera, hand-eye, laser plane and pointer from any recordings of boards, in one solve; stored when it is accepted.
+    /// Camera, hand-eye, laser plane and pointer from any recordings of boards, in one solve; stored when it is
+    /// accepted.
     Joint(JointOrder),
     /// The same by moves of the robot that the program chooses.
     Auto(AutoOrder),
@@ -82,7 +83,8 @@ pub struct FindOrder {
     pub scans: Vec<String>,
     /// Name of the recipe.
     pub recipe: String,
-    /// Two places in the first scan's map, mm: the tool goes where the middle of the pins there says; null: where the recipe says.
+    /// Two places in the first scan's map, mm: the tool goes where the middle of the pins there says; null: where the
+    /// recipe says.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub pins: Option<[[f64; 2]; 2]>,

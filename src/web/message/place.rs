@@ -110,8 +110,9 @@ pub struct BoardView {
     pub height: u32,
     /// The corners that were found, u and v, px.
     pub corners: Vec<[f64; 2]>,
-    /// How far the board's normal leans away from the camera's axis, to the right and downwards in the picture, degrees, by the
-    /// station's camera or else one as long as its picture is wide; null where too little of the board was found.
+    /// How far the board's normal leans away from the camera's axis, to the right and downwards in the picture,
+    /// degrees, by the station's camera or else one as long as its picture is wide; null where too little of the
+    /// board was found.
     pub lean_deg: Option<[f64; 2]>,
     /// Where the axis stood that the board rides on, counts; null without one, or where it is not known.
     pub count: Option<f64>,

@@ -1,5 +1,7 @@
-//! In: nothing. Out: the way of the line over a part before it is scanned, and which speed, step and pictures a second go together.
-//! Frame and unit: the board as the camera sees it squarely, from the foot of its axis (x right, y down), mm; mm/s; pictures a second.
+//! In: nothing. Out: the way of the line over a part before it is scanned, and which speed, step and pictures a
+//! second go together.
+//! Frame and unit: the board as the camera sees it squarely, from the foot of its axis (x right, y down), mm; mm/s;
+//! pictures a second.
 
 use crate::robot::Convention;
 use crate::station::job::{Pace as Paced, Preview};
@@ -65,13 +67,15 @@ pub struct SweepPlan {
     pub across_mm: f64,
     /// Left of the working volume above the board and below it, mm; null: nobody knows it.
     pub volume_mm: Option<[f64; 2]>,
-    /// Left to the sides of the flange's box, mm; negative: outside; null: no box is stated or the robot's place is not known.
+    /// Left to the sides of the flange's box, mm; negative: outside; null: no box is stated or the robot's place is
+    /// not known.
     pub box_mm: Option<f64>,
     /// Names of a flange pose's numbers.
     pub labels: Vec<String>,
     /// The flange at the first and the last shot; empty where the robot's place is not known.
     pub flange: Vec<Vec<f64>>,
-    /// What is swept, and how far a part in its middle reaches, in the camera's picture as it stands now, px; empty: not known.
+    /// What is swept, and how far a part in its middle reaches, in the camera's picture as it stands now, px; empty:
+    /// not known.
     pub seen_px: Vec<Vec<[f64; 2]>>,
     /// Pictures a second that the camera sends; null: not known.
     pub camera_hz: Option<f64>,

@@ -32,7 +32,8 @@ impl Grants {
         name
     }
 
-    /// The button was held: uses the right up. Errors: none of this name, of another tab or pose, not held long enough, too old.
+    /// The button was held: uses the right up. Errors: none of this name, of another tab or pose, not held long
+    /// enough, too old.
     pub fn redeem(&self, name: &str, tab: &Tab, what: &Confirmed) -> Result<()> {
         let mut held = self.0.lock().unwrap_or_else(|e| e.into_inner());
         let no = |why: String| {

@@ -77,7 +77,8 @@ impl Operator for Person<'_> {
         self.desk.over();
     }
 
-    /// Whoever pressed Arm stands beside the robot, and since a halt somebody has pressed that he has looked: without these no job has it.
+    /// Whoever pressed Arm stands beside the robot, and since a halt somebody has pressed that he has looked: without
+    /// these no job has it.
     fn looked(&mut self, why: &str) -> Result<bool> {
         self.tell(why);
         Ok(self.desk.state().look.is_none())

@@ -1,5 +1,5 @@
-//! In: a folder. Out: a simulated cell in this process, on ports of this machine, and a station that fits it; what happens in it goes
-//! into cell.jsonl.
+//! In: a folder. Out: a simulated cell in this process, on ports of this machine, and a station that fits it; what
+//! happens in it goes into cell.jsonl.
 //! Frame and unit: scene, mm; s of the cell.
 
 use crate::cell::{Cell, CellOptions, Over, Served};
@@ -104,8 +104,8 @@ impl SimulatedRobot {
         SimulatedCell { parts: PARTS.iter().map(|(name, _)| (*name).to_owned()).collect(), holds, over_board }
     }
 
-    /// A person lays the board with a part's socket before the robot, puts its component into the gripper, and jogs the arm there, or
-    /// over the calibration board.
+    /// A person lays the board with a part's socket before the robot, puts its component into the gripper, and jogs
+    /// the arm there, or over the calibration board.
     pub fn put(&self, holds: Option<&str>, over_board: bool) -> Result<()> {
         let _one = self.hands.lock().unwrap_or_else(PoisonError::into_inner);
         let part = holds.map_or_else(|| self.at().0.clone(), str::to_owned);

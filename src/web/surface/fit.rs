@@ -1,5 +1,7 @@
-//! In: heights at places, each with its standard deviation. Out: the straight line or plane through them, with covariance.
-//! Frame and unit: mm; the covariance is that of the coefficients, scaled up where the places scatter more than they state.
+//! In: heights at places, each with its standard deviation. Out: the straight line or plane through them, with
+//! covariance.
+//! Frame and unit: mm; the covariance is that of the coefficients, scaled up where the places scatter more than they
+//! state.
 
 use crate::geometry::{Mat3, Vec3};
 
@@ -26,8 +28,8 @@ const FINEST: f64 = 1e-4;
 const FLAT: f64 = 1e-6;
 
 impl Surface {
-    /// Weighted least squares; `None` below 3 places, or where they do not determine a plane. With `line` only a slope along
-    /// x is fitted, and 2 places are enough.
+    /// Weighted least squares; `None` below 3 places, or where they do not determine a plane. With `line` only a
+    /// slope along x is fitted, and 2 places are enough.
     pub fn fit(places: &[Place], line: bool) -> Option<Surface> {
         if places.len() < if line { 2 } else { 3 } {
             return None;

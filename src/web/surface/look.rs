@@ -1,5 +1,5 @@
-//! In: a scan's folder, the filters through which it is looked at. Out: its map through them; the filters are kept beside the scan, so that
-//! reload, second tab and restart see the same.
+//! In: a scan's folder, the filters through which it is looked at. Out: its map through them; the filters are kept
+//! beside the scan, so that reload, second tab and restart see the same.
 //! Frame and unit: the height map's grid frame, mm.
 
 use crate::fault::{Fault, Result};
@@ -70,7 +70,7 @@ impl Maps {
         if looked.filtered.left == 0 {
             return Err(Fault::refused("no cell is left")
                 .cause("the last filter takes everything away")
-                .next("choose another value; the former filters stay"));
+                .next("choose another value; the previous filters stay"));
         }
         let text = serde_json::to_string_pretty(&Filters { filters: looked.filtered.filters.clone() });
         crate::files::write(&kept(scan), text.expect("plain data").as_bytes())?;

@@ -29,7 +29,7 @@ struct Pointed {
 fn pointed(map: &HeightMap, at: &[f64; 2]) -> Result<Pointed> {
     let Some((z, sigma)) = cell_at(map, at[0], at[1]) else {
         return Err(Fault::refused(format!("nothing was measured at {:.3} {:.3} mm", at[0], at[1]))
-            .cause("the cell is missing: shadow, glare, or beside the scan")
+            .cause("the cell is missing: shadow, glare, or outside the scan")
             .next("point at a place that has a height"));
     };
     let flat = map.cell * map.cell / 12.0;
@@ -57,7 +57,7 @@ fn point_to_plane(map: &HeightMap, p: &Pointed, corners: &[f64; 4]) -> Result<Me
     let places = in_box(map, corners);
     let Some(plane) = Surface::fit(&places, false) else {
         return Err(Fault::refused(format!("{} measured cells in the box, which make no plane", places.len()))
-            .cause("the box is too small, or lies where nothing was seen")
+            .cause("the box is too small, or contains no cells")
             .next("draw a larger box over the surface"));
     };
     let (height, sigma) = plane.at(p.place.x, p.place.y);
@@ -103,7 +103,8 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, Normal};
 
-    /// A plate that rises by 0.1 a mm along x, with a step of 5 mm beyond x = 20, heights noisy by 0.02 mm as they state.
+    /// A plate that rises by 0.1 a mm along x, with a step of 5 mm beyond x = 20, heights noisy by 0.02 mm as they
+    /// state.
     fn map(seed: u64) -> HeightMap {
         let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
         let noise = Normal::new(0.0, 0.02).unwrap();
@@ -120,7 +121,8 @@ mod tests {
     #[test]
     fn distances_from_a_plane_scatter_as_they_state() {
         let ask = Measure::PointToPlane(PlaneAsk { point: [30.0, 10.1], plane: [1.0, 1.0, 19.0, 19.0] });
-        // Over the carried-on slope, along its normal; the place stands for its cell, which rises by half a cell's slope.
+        // Over the carried-on slope, along its normal; the place stands for its cell, which rises by half a cell's
+        // slope.
         let steep = 1.01f64.sqrt();
         let (mut sum, mut stated) = (0.0, 0.0);
         for seed in 0..400 {

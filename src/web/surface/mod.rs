@@ -1,4 +1,5 @@
-//! In: a height map or a cloud of a finished scan, places a person pointed at. Out: sections, distances and points to look at.
+//! In: a height map or a cloud of a finished scan, places a person pointed at. Out: sections, distances and points to
+//! look at.
 //! Frame and unit: grid frame, mm; each number with its standard deviation.
 
 mod fit;

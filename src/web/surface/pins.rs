@@ -1,5 +1,5 @@
-//! In: a recipe whose part was found, two places that were pointed at on the height map. Out: the same recipe with the tool where the
-//! two named shapes nearest to them say.
+//! In: a recipe whose part was found, two places that were pointed at on the height map. Out: the same recipe with
+//! the tool where the two named shapes nearest to them say.
 //! Frame and unit: grid frame of the map, part frame; mm.
 
 use crate::fault::{Fault, Result};

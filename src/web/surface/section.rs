@@ -1,5 +1,5 @@
-//! In: a height map, a line over it, pieces of that line. Out: heights along it, straight lines through the pieces, the step
-//! and the angle between them.
+//! In: a height map, a line over it, pieces of that line. Out: heights along it, straight lines through the pieces,
+//! the step and the angle between them.
 //! Frame and unit: grid frame, mm, degrees.
 
 use super::fit::Surface;
@@ -10,14 +10,14 @@ use crate::web::message::{Distance, Fit, Section, SectionAsk, SectionPoint};
 /// Most places of a section; a longer one has them farther apart.
 const MOST: usize = 8192;
 
-/// Samples the map each half cell. Errors: a line of no length, numbers that are not finite, more than two pieces or pieces
-/// with fewer than two cells.
+/// Samples the map each half cell. Errors: a line of no length, numbers that are not finite, more than two pieces or
+/// pieces with fewer than two cells.
 pub fn section(map: &HeightMap, ask: &SectionAsk) -> Result<Section> {
     let [dx, dy] = [ask.to[0] - ask.from[0], ask.to[1] - ask.from[1]];
     let length = dx.hypot(dy);
     if !(length > map.cell && length < 1e6) {
         return Err(Fault::usage(format!(
-            "the section is {length:.4} mm long, more than a cell of {} mm is wanted",
+            "the section is {length:.4} mm long, more than a cell of {} mm is needed",
             map.cell
         ))
         .next("draw a longer line"));
@@ -76,7 +76,7 @@ fn line(map: &HeightMap, ask: &SectionAsk, piece: &[f64; 2], length: f64) -> Res
     }
     Surface::fit(&places, true).ok_or_else(|| {
         Fault::refused(format!("{} measured cells between {from:.3} and {to:.3} mm, 2 are needed", places.len()))
-            .cause("the piece lies where nothing was seen, or is shorter than a cell")
+            .cause("the piece contains no cells, or is shorter than a cell")
             .next("draw it longer, over measured ground")
     })
 }

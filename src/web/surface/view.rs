@@ -14,8 +14,9 @@ pub struct CloudView {
     pub points: Vec<[f32; 5]>,
 }
 
-/// Takes at most `most` points, of those that `stays` lets stay. They are spread by a golden step over the scan, so that every share of them from the start on
-/// covers all of it: a page that shows the first tenth shows the whole part, coarsely.
+/// Takes at most `most` points, of those that `stays` lets stay. They are spread by a golden step over the scan, so
+/// that every share of them from the start on covers all of it: a page that shows the first tenth shows the whole
+/// part, coarsely.
 pub fn view(cloud: &impl PointSource, all: u64, most: usize, stays: &dyn Fn(&glam::Vec3) -> bool) -> Result<CloudView> {
     let every = all.div_ceil(most.max(1) as u64).max(1);
     let mut taken: Vec<CloudPoint> = Vec::with_capacity((all / every) as usize + 1);

@@ -109,7 +109,8 @@ fn picture_size(
     }
 }
 
-/// What the controller says of itself; its reported pose is that of the flange in the base, or poses mean something else.
+/// What the controller says of itself; its reported pose is that of the flange in the base, or poses mean something
+/// else.
 fn robot(robot: Option<&Robot>, add: &mut impl FnMut(&str, &str, &str, String)) {
     let Some(robot) = robot else {
         return add("robot", "robot", "absent", "the screen was served without --robot".into());
@@ -186,7 +187,7 @@ fn gpu(this: &Run) -> Result<Vec<(String, &'static str, String)>> {
 
 fn no_check(e: std::io::Error) -> Fault {
     Fault::device(format!("the check of the GPU cannot be started: {e}"))
-        .cause("the program's file was moved or replaced while it runs, or there is no memory")
+        .cause("the program's file was moved or replaced while it runs, or there is not enough memory")
         .next("start the server again, or run `sheetlight doctor` in a terminal")
 }
 

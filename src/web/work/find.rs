@@ -63,7 +63,7 @@ pub(super) fn teach(this: &Run, order: &TeachOrder) -> Result<Outcome> {
 
 fn scan_folders(this: &Run, scans: &[String]) -> Result<Vec<PathBuf>> {
     if scans.is_empty() {
-        return Err(Fault::usage("no scan was chosen").next("choose one, or several looks at the same part"));
+        return Err(Fault::usage("no scan was chosen").next("choose one, or several scans of the same part"));
     }
     scans.iter().map(|id| scan_of(&this.jobs.place.jobs(), &this.jobs.get(id)?)).collect()
 }

@@ -1,4 +1,5 @@
-//! In: a recipe, an armed robot, a camera. Out: the insertion, each motion shown at the screen and confirmed by a held button.
+//! In: a recipe, an armed robot, a camera. Out: the insertion, each motion shown at the screen and confirmed by a
+//! held button.
 //! Frame and unit: base frame; mm, s.
 
 use super::find::position;

@@ -15,7 +15,8 @@ use std::time::{Duration, Instant};
 
 /// Jobs that wait.
 const MOST_WAITING: usize = 32;
-/// Pages are told of progress this often at most: a browser without a GPU spends 10 ms of a core on each frame, whatever changed in it.
+/// Pages are told of progress this often at most: a browser without a GPU spends 10 ms of a core on each frame,
+/// whatever changed in it.
 const TOLD: Duration = Duration::from_millis(500);
 
 /// All jobs of a station.
@@ -153,8 +154,9 @@ impl Jobs {
         let stops = self.state().stops;
         let mut job = self.get(id)?;
         if back_out && !matches!(job.order, Order::Insert(_)) {
-            return Err(Fault::usage(format!("{id}: moves no robot, there is nothing to back out of"))
-                .next("take it away, or resume it"));
+            return Err(
+                Fault::usage(format!("{id}: moves no robot, so it cannot back out")).next("take it away, or resume it")
+            );
         }
         if !matches!(job.state, JobState::CutOff | JobState::Stopped | JobState::Failed) {
             return Err(

@@ -1,4 +1,5 @@
-//! In: orders of an operator. Out: jobs that run one after the other on a thread of their own, kept on disk with their state.
+//! In: orders of an operator. Out: jobs that run one after the other on a thread of their own, kept on disk with
+//! their state.
 //! Frame and unit: as the procedures; mm, degrees.
 
 mod calibrate;

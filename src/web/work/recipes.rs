@@ -22,8 +22,8 @@ const SHIPPED: [(&str, &str); 4] = [
     ("osc", include_str!("../../../data/recipes/osc.toml")),
 ];
 
-/// All of them: the station's own first, in the order of their names; a station's own replaces a shipped one of that name.
-/// One that cannot be read stands in the list with what is wrong with it.
+/// All of them: the station's own first, in the order of their names; a station's own replaces a shipped one of that
+/// name. One that cannot be read stands in the list with what is wrong with it.
 pub fn recipes(place: &Place) -> Vec<RecipeText> {
     let entries = std::fs::read_dir(place.recipes()).into_iter().flatten().flatten();
     let mut own: Vec<RecipeText> = entries.filter_map(|entry| of_file(&entry.path())).collect();
@@ -55,7 +55,7 @@ fn listed(name: &str, text: Result<String>, shipped: bool) -> RecipeText {
 /// Where a station's own recipe lies. Errors: a name that is none.
 fn recipe_path(place: &Place, name: &str) -> Result<PathBuf> {
     if !plain(name) {
-        return Err(Fault::usage(format!("{name:?} is no name for a recipe"))
+        return Err(Fault::usage(format!("{name:?} is an invalid recipe name"))
             .cause("names have letters, digits, blanks and . _ - + ( )")
             .next("choose another name"));
     }
@@ -68,7 +68,7 @@ pub fn vacant(place: &Place, name: &str, replace: bool) -> Result<()> {
     if !replace && recipe_path(place, name)?.exists() {
         return Err(Fault::refused(format!("{name}: is a recipe of this station already"))
             .cause("another part was called so, or this one was stored before")
-            .next("choose another name, or say that it is to be replaced"));
+            .next("choose another name, or confirm the replacement"));
     }
     Ok(())
 }
@@ -94,7 +94,7 @@ pub fn save_recipe(place: &Place, name: &str, text: &str, replace: bool) -> Resu
 pub fn remove_recipe(place: &Place, name: &str) -> Result<()> {
     let path = recipe_path(place, name)?;
     if !path.is_file() {
-        return Err(Fault::input(format!("{name}: is no recipe of this station's own"))
+        return Err(Fault::input(format!("{name}: is not a recipe of this station's own"))
             .cause("shipped recipes stay")
             .next("choose another"));
     }
@@ -124,7 +124,8 @@ pub fn change_points(ask: &PointsChange) -> Result<PointsChanged> {
     Ok(PointsChanged { points: points(&text)?, text })
 }
 
-/// Every point by which a recipe's text can say where the tool goes: shapes with names, and what is constructed of them.
+/// Every point by which a recipe's text can say where the tool goes: shapes with names, and what is constructed of
+/// them.
 ///
 /// # Errors
 /// The text is no recipe.
@@ -193,7 +194,7 @@ pub fn load(place: &Place, name: &str) -> Result<Recipe> {
         return Recipe::load(&path);
     }
     let shipped = SHIPPED.iter().find(|(known, _)| *known == name).ok_or_else(|| {
-        Fault::input(format!("{name:?}: is no recipe of this station")).next("choose one from the list")
+        Fault::input(format!("{name:?}: is not a recipe of this station")).next("choose one from the list")
     })?;
     Recipe::parse(shipped.1).map_err(|e| e.at(name))
 }

@@ -41,7 +41,7 @@ pub(super) fn scan(this: &Run, asked: &ScanOrder) -> Result<Outcome> {
     let report = scan_recording(&recording, None, &rig, &options, |done, of| this.progress(done, of))?;
     let mut frames = this.jobs.frames.lock().unwrap_or_else(|e| e.into_inner());
     for (_, why) in &report.skipped {
-        *frames.dropped.entry(format!("left out: {why}")).or_default() += 1;
+        *frames.dropped.entry(format!("excluded: {why}")).or_default() += 1;
     }
     drop(frames);
     report.has_points()?;

@@ -52,7 +52,7 @@ pub(super) fn save(jobs: &Path, job: &Job) -> Result<()> {
 /// The scan folder of a job that scanned; refused for any other.
 pub fn scan_of(jobs: &Path, job: &Job) -> Result<PathBuf> {
     if !matches!((&job.order, job.state), (Order::Scan(_) | Order::Filter(_), JobState::Done)) {
-        return Err(Fault::usage(format!("{}: is no finished scan", job.id))
+        return Err(Fault::usage(format!("{}: is not a finished scan", job.id))
             .cause("it failed, still runs, or is another procedure")
             .next("choose a scan that is done"));
     }

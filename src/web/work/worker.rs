@@ -1,4 +1,5 @@
-//! In: jobs that wait. Out: the same, run one after the other on one thread; a panic in one of them ends that job alone.
+//! In: jobs that wait. Out: the same, run one after the other on one thread; a panic in one of them ends that job
+//! alone.
 //! Frame and unit: seconds.
 
 use super::jobs::{Jobs, Taken};

@@ -1,5 +1,5 @@
-//! In: stops of random stations. Out: how far scanned points are off after the joint solve, beside what it says, and beside
-//! the separate calibrations from the same pictures.
+//! In: stops of random stations. Out: how far scanned points are off after the joint solve, beside what it says, and
+//! beside the separate calibrations from the same pictures.
 //! Frame and unit: mm.
 
 use super::stations::{Cell, LOUD, Levels, QUIET, calibrate, data_sheet, errors, rig, stops};
@@ -45,7 +45,8 @@ fn points_are_as_good_as_the_solve_says() {
         let (off, ratio) = (rms(each.iter().map(|e| e[0])), rms(each.iter().map(|e| e[0] / e[1])));
         let robot = rms(each.iter().map(|e| e[2]));
         println!(
-            "{name}, robot {} mm: points off {off:.4} mm rms, over sigma {ratio:.2}; by the robot's noise alone {robot:.4} mm",
+            "{name}, robot {} mm: points off {off:.4} mm rms, over sigma {ratio:.2}; by the robot's noise alone \
+             {robot:.4} mm",
             levels.robot_mm
         );
         let bar = if bar.is_nan() { 1.1 * robot } else { bar };
@@ -77,8 +78,8 @@ fn every_source_gets_the_weight_that_its_residuals_show() {
     assert!((data_sheet(&cell).fx - cell.station.camera.fx).abs() > 1.0);
 }
 
-/// An arm far better than the boards are seen leaves little of its own to see: what is stated of points is right all the same, and the
-/// calibration is not refused. Few stops are.
+/// An arm far better than the boards are seen leaves little of its own to see: what is stated of points is right all
+/// the same, and the calibration is not refused. Few stops are.
 #[test]
 fn an_arm_too_exact_to_be_seen_is_no_reason_to_refuse() {
     let limits =
@@ -110,8 +111,8 @@ fn an_arm_too_exact_to_be_seen_is_no_reason_to_refuse() {
     assert!(judged(2e-4, 3, 3).1.verdict == Verdict::BadlyDetermined);
 }
 
-/// What the records say one by one, added up as if they were independent, beside what they say together (docs/math.md, Joint
-/// calibration (12)).
+/// What the records say one by one, added up as if they were independent, beside what they say together
+/// (docs/math.md, Joint calibration (12)).
 #[test]
 fn records_by_themselves_promise_no_more_than_together() {
     for name in ["paper", "upright", "telephoto"] {

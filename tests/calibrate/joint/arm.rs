@@ -1,5 +1,5 @@
-//! In: an arm whose links and joint zeros are not what its controller believes. Out: whether the joint solve says that the arm
-//! limits it, and how far points are off in the calibrated volume.
+//! In: an arm whose links and joint zeros are not what its controller believes. Out: whether the joint solve says
+//! that the arm limits it, and how far points are off in the calibrated volume.
 //! Frame and unit: mm, degrees.
 
 use super::stations::{Cell, Levels, QUIET, calibrate, rig};
@@ -14,8 +14,8 @@ use sheetlight::calibrate::joint::solve::JointFit;
 use sheetlight::calibrate::joint::volume::{places, scanned};
 use sheetlight::geometry::{Base, Board, Camera, Flange, Rigid, Vec3, exp, log};
 
-/// A six-axis arm by its joint chain: origin of each joint in the frame before, mm, and its axis. The numbers are a Denso
-/// VS-060's.
+/// A six-axis arm by its joint chain: origin of each joint in the frame before, mm, and its axis. The numbers are a
+/// Denso VS-060's.
 #[derive(Clone)]
 struct Arm {
     origins: [Vec3; 6],
@@ -105,14 +105,15 @@ fn sent(cell: &Cell, arm: &Arm, view: &Rigid<Camera, Board>) -> Option<(Rigid<Ca
     Some(((truly * cell.station.flange_from_camera).inverse() * cell.base_from_board, asked))
 }
 
-/// Points of new poses, relative to the board as everybody finds it: what a part found and gripped by the same arm is off by.
+/// Points of new poses, relative to the board as everybody finds it: what a part found and gripped by the same arm is
+/// off by.
 fn points_off(cell: &Cell, arm: &Arm, fit: &JointFit) -> f64 {
     let truth = cell.truth(&[]);
     let lit = places(&truth, cell.working());
     let w = fit.state.far_from_board[0];
     let found: Rigid<Base, Board> = Rigid::new(w.rotation, w.translation);
     let mut off = Vec::new();
-    for view in cell.views(25, 35.0, "left out") {
+    for view in cell.views(25, 35.0, "excluded") {
         let Some((seen, asked)) = sent(cell, arm, &view) else { continue };
         for pixel in lit.iter().step_by(7) {
             let (Some(p), Some(q)) = (scanned(&fit.state, pixel), scanned(&truth, pixel)) else { continue };
@@ -133,13 +134,19 @@ fn an_arm_that_errs_by_its_own_shape_is_named_as_what_limits() {
             let run = |arm: &Arm| -> JointFit {
                 let mut rng = Pcg64::seed_from_u64(seed + 70);
                 let exact = Levels { robot_mm: 0.0, robot_deg: 0.0, ..QUIET };
-                let stops = cell.views(64, 40.0, "arm").iter().enumerate().filter_map(|(i, view)| {
-                    let (seen, asked) = sent(&cell, arm, view)?;
-                    let mut shot: Shot = cell.shot(i, &seen, &exact, &mut rng);
-                    let noisy = sheetlight::simulate::reported(&asked, QUIET.robot_mm, QUIET.robot_deg, &mut rng);
-                    shot.robot.as_mut().unwrap().pose = noisy;
-                    Some(shot)
-                }).take(40).collect::<Vec<_>>();
+                let stops = cell
+                    .views(64, 40.0, "arm")
+                    .iter()
+                    .enumerate()
+                    .filter_map(|(i, view)| {
+                        let (seen, asked) = sent(&cell, arm, view)?;
+                        let mut shot: Shot = cell.shot(i, &seen, &exact, &mut rng);
+                        let noisy = sheetlight::simulate::reported(&asked, QUIET.robot_mm, QUIET.robot_deg, &mut rng);
+                        shot.robot.as_mut().unwrap().pose = noisy;
+                        Some(shot)
+                    })
+                    .take(40)
+                    .collect::<Vec<_>>();
                 assert!(stops.len() > 30, "{} poses are within reach", stops.len());
                 calibrate(&cell, &stops, &JointOptions::default()).unwrap()
             };
@@ -149,7 +156,8 @@ fn an_arm_that_errs_by_its_own_shape_is_named_as_what_limits() {
             let [a, b] = [&straight, &bent].map(|f| systematic(f, &o).unwrap());
             let off = points_off(&cell, &arm, &bent);
             println!(
-                "station {seed}: points off {off:.4} mm; the arm {:.4} mm {:.4} degrees, predicts {:.2} of a pose left out (by chance {:.2}); \
+                "station {seed}: points off {off:.4} mm; the arm {:.4} mm {:.4} degrees, predicts {:.2} of a pose \
+                 left out (by chance {:.2}); \
                  without the error {:.4} mm {:.4} degrees, {:.2} ({:.2}), points off {:.4}",
                 bent.noise.robot_mm,
                 bent.noise.robot_rad.to_degrees(),

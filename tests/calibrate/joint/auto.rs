@@ -1,5 +1,5 @@
-//! In: simulated cells that the program drives by itself: pictures of a board as each pose sees it. Out: whether it calibrates
-//! them, within its box, and says what is wrong where it cannot.
+//! In: simulated cells that the program drives by itself: pictures of a board as each pose sees it. Out: whether it
+//! calibrates them, within its box, and says what is wrong where it cannot.
 //! Frame and unit: base frame, mm, degrees.
 
 use super::stations::{Cell, rig};

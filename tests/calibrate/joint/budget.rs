@@ -1,5 +1,5 @@
-//! In: joint solves of simulated stations, a flat part that is scanned with them. Out: whether the error budget of a found pose is
-//! what the pose is truly off by, and what records that are taken as independent would make of it.
+//! In: joint solves of simulated stations, a flat part that is scanned with them. Out: whether the error budget of a
+//! found pose is what the pose is truly off by, and what records that are taken as independent would make of it.
 //! Frame and unit: base frame; mm, rad.
 
 use super::seeds;
@@ -33,7 +33,8 @@ fn stored(fit: &JointFit) -> Rig {
     Rig { camera: Some(camera), laser_plane: Some(plane), hand_eye: Some(hand_eye), joint, ..Rig::default() }
 }
 
-/// A flat part squarely before the camera, 24 shots over it: as the fit sees it, and the true displacement of each place.
+/// A flat part squarely before the camera, 24 shots over it: as the fit sees it, and the true displacement of each
+/// place.
 fn scan(cell: &Cell, fit: &JointFit) -> (PartSeen, Vec<Vec3>) {
     let (truth, depth) = (cell.truth(&[]), cell.station.working_distance);
     let n = truth.plane.normal;
@@ -76,8 +77,8 @@ fn scan(cell: &Cell, fit: &JointFit) -> (PartSeen, Vec<Vec3>) {
     (PartSeen::of(part, seen, edges.collect()).unwrap(), moved)
 }
 
-/// Of one station: the pose's true error over its budget (mean square of six numbers), and how much larger the shift's sigma
-/// would be from records taken as independent.
+/// Of one station: the pose's true error over its budget (mean square of six numbers), and how much larger the
+/// shift's sigma would be from records taken as independent.
 fn one(name: &str, seed: u64) -> (f64, f64) {
     let cell = Cell::new(&rig(name), seed);
     let fit = calibrate(&cell, &stops(&cell, 30, 40.0, &QUIET, seed), &JointOptions::default()).unwrap();

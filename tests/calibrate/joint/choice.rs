@@ -1,5 +1,5 @@
-//! In: stations that know little of themselves yet. Out: how many stops it takes with the choice of poses, with poses at
-//! random, and with a fixed list.
+//! In: stations that know little of themselves yet. Out: how many stops it takes with the choice of poses, with poses
+//! at random, and with a fixed list.
 //! Frame and unit: mm, degrees.
 
 use super::stations::{Cell, QUIET, calibrate, errors, rig};

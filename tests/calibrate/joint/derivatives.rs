@@ -1,5 +1,5 @@
-//! In: stops of either mount. Out: whether each residual's derivatives are its derivatives, and a camera that stands still is
-//! calibrated as one on the flange is.
+//! In: stops of either mount. Out: whether each residual's derivatives are its derivatives, and a camera that stands
+//! still is calibrated as one on the flange is.
 //! Frame and unit: mm, rad, px; residuals in sigmas.
 
 use super::stations::{Cell, QUIET, calibrate, rig, stops};

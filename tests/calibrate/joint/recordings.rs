@@ -1,5 +1,5 @@
-//! In: recordings with pictures, simulated ones and the rendered reference. Out: whether `calibrate joint` comes to the true
-//! rig from them, in any order, beside separate calibrations.
+//! In: recordings with pictures, simulated ones and the rendered reference. Out: whether `calibrate joint` comes to
+//! the true rig from them, in any order, beside separate calibrations.
 //! Frame and unit: mm, degrees.
 
 use crate::common::{reference, rigs, sheetlight, sheetlight_fails};

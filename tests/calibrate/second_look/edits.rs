@@ -12,7 +12,8 @@ pub fn another(b: &Believed) -> Station {
     Station::of(&b.station.rig, b.station.seed + 77).with_size(w, h)
 }
 
-/// A bracket bumped by a millimetre, in proportion on stations larger than the paper's; a small one is not bumped by less.
+/// A bracket bumped by a millimetre, in proportion on stations larger than the paper's; a small one is not bumped by
+/// less.
 fn millimetre(b: &Believed) -> f64 {
     b.unit.max(1.0)
 }
@@ -46,8 +47,8 @@ pub fn lost(looks: &mut [Recorded; 2], count: usize) {
     }
 }
 
-/// Thirty ways to make a good station or recording wrong by one edit: unit, sign, transpose, order, delay, scale, mirror,
-/// frame, mixed files.
+/// Thirty ways to make a good station or recording wrong by one edit: unit, sign, transpose, order, delay, scale,
+/// mirror, frame, mixed files.
 pub const EDITS: &[Edit] = &[
     ("hand-eye translation in metres", |b, _| b.hand_eye.translation *= 1e-3),
     ("hand-eye 1 mm off in x", |b, _| b.hand_eye.translation.x += millimetre(b)),
@@ -104,8 +105,8 @@ pub const EDITS: &[Edit] = &[
     }),
 ];
 
-/// Errors of a few of the calibrations' own sigmas: looks cannot show them all, but what passes is within what the report says that
-/// the looks leave unseen.
+/// Errors of a few of the calibrations' own sigmas: looks cannot show them all, but what passes is within what the
+/// report says that the looks leave unseen.
 pub const FAINT: &[Edit] = &[
     ("plane's offset 0.2 % less", |b, _| b.plane.offset /= 1.002),
     ("plane's offset 0.1 mm more", |b, _| b.plane.offset += 0.1 * b.unit),

@@ -1,5 +1,5 @@
-//! In: a station before a scene and where its camera stands at each shot. Out: the peaks that the engine finds in the pictures, which
-//! are rendered without noise: a draw adds its own. Frame and unit: scene frame, mm; px, grey levels.
+//! In: a station before a scene and where its camera stands at each shot. Out: the peaks that the engine finds in the
+//! pictures, which are rendered without noise: a draw adds its own. Frame and unit: scene frame, mm; px, grey levels.
 
 use rand_pcg::Pcg64;
 use rayon::prelude::*;

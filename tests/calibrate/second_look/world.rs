@@ -1,5 +1,5 @@
-//! In: designs of stations, a part before them. Out: what a program gets of two looks at it, with known truth, and the station that it
-//! believes in. Peaks are the engine's, from rendered pictures. Frame and unit: base frame; mm, px.
+//! In: designs of stations, a part before them. Out: what a program gets of two looks at it, with known truth, and
+//! the station that it believes in. Peaks are the engine's, from rendered pictures. Frame and unit: base frame; mm, px.
 
 use super::pictures::{Peak, peaks};
 use nalgebra::{DMatrix, DVector};
@@ -15,8 +15,8 @@ use sheetlight::scan::{Along, CloudPoint, Shots};
 use sheetlight::simulate::{InScene, RigSpec, Scene, SceneSpec, Station, base_from_scene, flange, part_pose, scan};
 use std::path::PathBuf;
 
-/// Errors of the calibrations, one standard deviation, as good stations of the paper's size have them; lengths of other designs
-/// in proportion to their field.
+/// Errors of the calibrations, one standard deviation, as good stations of the paper's size have them; lengths of
+/// other designs in proportion to their field.
 pub const HAND_EYE_MM: f64 = 0.03;
 pub const HAND_EYE_RAD: f64 = 1.5e-4;
 pub const PLANE_RAD: f64 = 1e-4;
@@ -80,7 +80,8 @@ pub fn looked_at(rig: &RigSpec, name: &str) -> (SceneSpec, Recipe) {
         (spec, Recipe::load(&root.join("data/recipes/led.toml")).unwrap(), [20.0, 13.0], "led")
     } else {
         let u = rig.scale();
-        // Steps of a scan of the plate alone, turned and tilted; finer ones than the rig's own do not make the map's cells finer.
+        // Steps of a scan of the plate alone, turned and tilted; finer ones than the rig's own do not make the map's
+        // cells finer.
         let shots = ((SHOTS as f64 * 32.0 / 30.0) as usize).min(rig.shots());
         (rig.scene(), Recipe::parse(&rig.recipe(shots)).unwrap(), [21.0 * u, 14.5 * u], "notched")
     };

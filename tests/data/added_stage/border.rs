@@ -1,4 +1,5 @@
-//! In: the thinned mask of the lit tiles. Out: the same without the pixels on the picture's border, whose profile is cut off.
+//! In: the thinned mask of the lit tiles. Out: the same without the pixels on the picture's border, whose profile is
+//! cut off.
 //! Frame and unit: pixels.
 
 use crate::gpu::Access::*;

@@ -1,4 +1,5 @@
-// In: the thinned mask of the lit tiles. Out: the same without the pixels on the picture's border, whose profile is cut off.
+// In: the thinned mask of the lit tiles. Out: the same without the pixels on the picture's border, whose profile is
+// cut off.
 // Frame and unit: pixels. Twin and reasons: src/stages/stripe/border.rs.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;

@@ -1,4 +1,5 @@
-//! In: pictures with several equal parts, drawn here. Out: judgement on `sheetlight match` and `teach --region` run as commands.
+//! In: pictures with several equal parts, drawn here. Out: judgement on `sheetlight match` and `teach --region` run
+//! as commands.
 //! Frame and unit: pixels, degrees.
 
 use super::scenes::{Picture, bracket, draw};
@@ -100,5 +101,5 @@ fn what_cannot_be_searched_is_refused() {
         assert!(said.contains(word), "{more:?}: {said}");
     }
     let (_, said) = sheetlight_fails(&["match", text(&at("no.json")), text(&part)]);
-    assert!(said.contains("no taught part"), "{said}");
+    assert!(said.contains("not a taught part"), "{said}");
 }

@@ -1,5 +1,6 @@
-//! In: real height maps of another sensor (SHEETLIGHT_REFERENCE), written as the files that other programs write. Out: judgement on
-//! `import-map`: the same points whatever the format, parts found in them where they lie, nothing guessed.
+//! In: real height maps of another sensor (SHEETLIGHT_REFERENCE), written as the files that other programs write.
+//! Out: judgement on `import-map`: the same points whatever the format, parts found in them where they lie, nothing
+//! guessed.
 //! Frame and unit: the map's own frame, mm.
 
 use crate::common::{reference, sheetlight, sheetlight_fails};

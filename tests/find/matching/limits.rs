@@ -1,4 +1,5 @@
-//! In: a drawn part in a picture. Out: judgement on ranges of turn and scale, and on regions: they limit the result, not the start.
+//! In: a drawn part in a picture. Out: judgement on ranges of turn and scale, and on regions: they limit the result,
+//! not the start.
 //! Frame and unit: pixels, degrees.
 
 use super::scenes::{H, Picture, W, bracket, draw, taught};
@@ -36,7 +37,8 @@ fn ranges_limit_what_is_returned() {
     assert_eq!(found(20.0, 1.08, [-180.0, 180.0], [0.95, 1.03], &mut rng), None, "1.08 is none of 0.95 to 1.03");
 }
 
-/// Two layers that show the same edges are not independent: they state no smaller sigma than one of them, and a finite one.
+/// Two layers that show the same edges are not independent: they state no smaller sigma than one of them, and a
+/// finite one.
 #[test]
 fn a_second_layer_of_the_same_edges_halves_nothing() {
     let mut rng = Pcg64::seed_from_u64(5);

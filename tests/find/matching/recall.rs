@@ -1,5 +1,6 @@
-//! In: parts of several kinds and sizes of whose edges three tenths are hidden, on clutter of any grey, with noise; the same pictures
-//! without the part. Out: judgement on recall at no false alarm, on place and turn (truth is what was drawn).
+//! In: parts of several kinds and sizes of whose edges three tenths are hidden, on clutter of any grey, with noise;
+//! the same pictures without the part. Out: judgement on recall at no false alarm, on place and turn (truth is what
+//! was drawn).
 //! Frame and unit: pixels and degrees.
 
 use super::scenes::{H, PARTS, Part, Picture, Thing, W, draw, occluder, taught};
@@ -50,7 +51,8 @@ fn case(taught: &Taught, seed: u64, options: &SearchOptions) -> Case {
     let bright = rng.random_bool(0.5);
     let back = rng.random_range(40.0..90.0);
     let front = back + rng.random_range(70.0..130.0);
-    // The model was taught bright on dark: clutter is of any grey, but leaves the part its contrast in half of the scenes.
+    // The model was taught bright on dark: clutter is of any grey, but leaves the part its contrast in half of the
+    // scenes.
     let greys = if bright { 15.0..back + 40.0 } else { 15.0..235.0 };
     let under: Vec<Thing> = (0..14).map(|_| Thing::random(&mut rng, greys.clone())).collect();
     let drawn = Pose { angle: truth.angle + taught.at, scale: taught.size, ..truth };
@@ -99,8 +101,8 @@ fn judged(part: Part, size: f64, scenes: u64) -> Said {
     }
 }
 
-/// 92 % are asked for at no false alarm and reached for some parts; what is there must not be lost, and the error stays what its
-/// sigma says. SHEETLIGHT_LONG=1: three parts at three sizes, 80 scenes with and 80 without the part.
+/// 92 % are asked for at no false alarm and reached for some parts; what is there must not be lost, and the error
+/// stays what its sigma says. SHEETLIGHT_LONG=1: three parts at three sizes, 80 scenes with and 80 without the part.
 #[test]
 fn three_tenths_hidden_in_noise_and_clutter() {
     let long = std::env::var_os("SHEETLIGHT_LONG").is_some();
@@ -110,7 +112,8 @@ fn three_tenths_hidden_in_noise_and_clutter() {
         for &size in sizes {
             let s = judged(*part, size, scenes);
             println!(
-                "{name} {size}: recall at no alarm {:.1} %, by default {:.1} % ({} alarms), {:.4} px, {:.4} degrees, over sigma {:.2?}",
+                "{name} {size}: recall at no alarm {:.1} %, by default {:.1} % ({} alarms), {:.4} px, {:.4} degrees, \
+                 over sigma {:.2?}",
                 100.0 * s.recall,
                 100.0 * s.by_default,
                 s.alarms,

@@ -1,4 +1,5 @@
-//! In: seeds. Out: pictures drawn from exact shapes, parts of several kinds and sizes, what hides them, what lies around them.
+//! In: seeds. Out: pictures drawn from exact shapes, parts of several kinds and sizes, what hides them, what lies
+//! around them.
 //! Frame and unit: pixels; greys of 8 bits.
 
 use rand::{Rng, SeedableRng};

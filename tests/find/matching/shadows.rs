@@ -1,4 +1,5 @@
-//! In: height maps of a socket with windows, as a line scan sees it: what is low beside a wall is in the camera's shadow, and missing.
+//! In: height maps of a socket with windows, as a line scan sees it: what is low beside a wall is in the camera's
+//! shadow, and missing.
 //! Out: judgement on where it is found. Frame and unit: cells of the map, mm.
 
 use rand::{Rng, SeedableRng};
@@ -24,7 +25,8 @@ fn body(x: f64, y: f64) -> bool {
     x.abs() < 15.24 && y.abs() < 8.89 && !window && (x + 15.24).hypot(y) > 1.5
 }
 
-/// A map of the part at a place (cells) and turn; `shadow` mm beside whatever stands 4.2 mm high are missing, towards larger x.
+/// A map of the part at a place (cells) and turn; `shadow` mm beside whatever stands 4.2 mm high are missing, towards
+/// larger x.
 fn map(x: f64, y: f64, turn: f64, shadow: f64, rng: &mut Pcg64) -> Scene {
     let (s, c) = turn.sin_cos();
     let place = |u: f64, v: f64| {
@@ -58,7 +60,8 @@ fn map(x: f64, y: f64, turn: f64, shadow: f64, rng: &mut Pcg64) -> Scene {
     Scene::new(vec![Layer::new(Kind::Height, W, H, values).unwrap()], Some(CELL_MM)).unwrap()
 }
 
-/// A shadow's cells count half, so a pose as far off as a shadow is wide scores well too: it has to be climbed down from.
+/// A shadow's cells count half, so a pose as far off as a shadow is wide scores well too: it has to be climbed down
+/// from.
 #[test]
 fn a_part_is_found_where_it_stands_and_not_a_shadow_beside() {
     let recipe = Recipe::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data/recipes/led.toml")).unwrap();

@@ -36,7 +36,7 @@ struct Sight {
 /// Finds a ChArUco board that is at least partly in view.
 pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<BoardView> {
     let BoardSpec::Charuco { squares, square_mm, marker_mm, first_square, .. } = board else {
-        return Err(Fault::usage("the board is no ChArUco board").next("describe a ChArUco board"));
+        return Err(Fault::usage("the board is not a ChArUco board").next("describe a ChArUco board"));
     };
     let layout = Layout { squares: *squares, marker: marker_mm / square_mm };
     let grey = Grey::new(image);
@@ -82,11 +82,15 @@ fn choose(
         (true, false) => Ok(Some(white)),
         (false, true) => Ok(Some(black)),
         _ if black.markers > 0 => Err(Fault::refused(format!(
-            "the picture does not tell which colour the {columns}x{rows} ChArUco board begins with: {} markers fit both",
+            "the picture does not show which colour the {columns}x{rows} ChArUco board begins with: {} markers fit \
+             both",
             black.markers
         ))
         .cause("the board's outer columns are out of view")
-        .next("state \"first_square\" in the board's description: \"white\" for boards of OpenCV before 4.6, else \"black\"")),
+        .next(
+            "state \"first_square\" in the board's description: \"white\" for boards of OpenCV before 4.6, else \
+               \"black\"",
+        )),
         _ => Ok(Some(black)),
     }
 }
@@ -191,6 +195,9 @@ fn why_not(layout: &Layout, span: f64, reason: &str) -> Fault {
         .next("adjust the exposure so that white squares reach half of full scale");
     }
     Fault::refused(if reason.is_empty() { wanted } else { format!("{wanted} ({reason})") })
-        .cause("the board is out of view or out of focus, its markers are smaller than 15 px, or the description names another dictionary or size")
+        .cause(
+            "the board is out of view or out of focus, its markers are smaller than 15 px, or the description \
+                names another dictionary or size",
+        )
         .next("look at the picture and compare the printed board with its description")
 }

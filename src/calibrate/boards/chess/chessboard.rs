@@ -9,7 +9,8 @@ use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
 use crate::raster::Image;
 
-/// Corners from which a lattice may grow: what it becomes is verified on the picture, corner by corner, and must be the whole board.
+/// Corners from which a lattice may grow: what it becomes is verified on the picture, corner by corner, and must be
+/// the whole board.
 const SEED: usize = 12;
 
 /// Finds a chessboard that is wholly in view.
@@ -97,8 +98,8 @@ fn whole(
     corners.iter().all(Option::is_some).then_some(Found { grid: turned, corners })
 }
 
-/// Grows the lattice as far as the picture shows the board, a line beyond what was asked for at least: a larger board is
-/// not this one. A few corners may stay unseen (glare).
+/// Grows the lattice as far as the picture shows the board, a line beyond what was asked for at least: a larger board
+/// is not this one. A few corners may stay unseen (glare).
 fn mended(
     grid: &Grid,
     columns: usize,

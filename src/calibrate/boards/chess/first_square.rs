@@ -1,8 +1,8 @@
 //! Boards with markers for a detector that only knows boards whose first square is black and whose first id is 0.
 //!
-//! OpenCV before 4.6 drew boards with an even number of rows from a white square on. After a half turn (columns odd) or a
-//! quarter turn (columns even) such a board begins with a black square. Its markers then stand turned and in another order; a
-//! dictionary of their turned codes in that order makes it a board that the detector knows.
+//! OpenCV before 4.6 drew boards with an even number of rows from a white square on. After a half turn (columns odd)
+//! or a quarter turn (columns even) such a board begins with a black square. Its markers then stand turned and in
+//! another order; a dictionary of their turned codes in that order makes it a board that the detector knows.
 
 use crate::fault::{Fault, Result};
 use crate::recording::{BoardSpec, Markers};
@@ -27,7 +27,8 @@ pub struct Turned {
 }
 
 impl Turned {
-    /// `None` for a board that cannot be turned so that it begins with a black square: white first, columns and rows odd.
+    /// `None` for a board that cannot be turned so that it begins with a black square: white first, columns and rows
+    /// odd.
     pub fn of(squares: [u32; 2], white: bool) -> Option<Turned> {
         let turn = match (white, squares[0].is_multiple_of(2), squares[1].is_multiple_of(2)) {
             (false, ..) => Turn::None,
@@ -92,7 +93,7 @@ impl Turned {
             .collect();
         let codes = kept(codes.into_values().collect());
         Dictionary::from_static_codes(all.name(), bits, all.max_correction_bits(), codes).map_err(|e| {
-            Fault::input(format!("the markers cannot be told apart: {e}"))
+            Fault::input(format!("the markers cannot be distinguished: {e}"))
                 .cause("two markers of the board have one code")
                 .next("correct the dictionary and first_id in the board's description")
         })

@@ -67,8 +67,8 @@ impl Grid {
         }
         Grid { columns, rows, corners }
     }
-    /// Columns and rows (first, one past the last) of the lattice without outer lines that hold fewer than half of their
-    /// corners.
+    /// Columns and rows (first, one past the last) of the lattice without outer lines that hold fewer than half of
+    /// their corners.
     pub fn extent(&self) -> [std::ops::Range<usize>; 2] {
         let known = |i: usize, j: usize| usize::from(self.corners[j * self.columns + i].is_some());
         let span = |n: usize, any: &dyn Fn(usize) -> bool| {

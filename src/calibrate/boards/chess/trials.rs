@@ -162,8 +162,8 @@ fn every_kind_is_found_where_it_is_from_every_side() {
     }
 }
 
-/// Boards as OpenCV drew them before 4.6, with a first id, and as it draws them now, with descriptions that leave the first
-/// square open.
+/// Boards as OpenCV drew them before 4.6, with a first id, and as it draws them now, with descriptions that leave the
+/// first square open.
 #[test]
 fn the_first_square_is_found_out_from_the_ids() {
     for (squares, printed, first_id) in

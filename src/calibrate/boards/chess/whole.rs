@@ -16,8 +16,8 @@ use std::f64::consts::{PI, TAU};
 const WIDTH: usize = 640;
 const HEIGHT: usize = 480;
 
-/// Smallest squares: a corner's fit has four quarters of a square to look at. A marker's cell must stand out of the blur: of cells
-/// narrower than twice its sigma every other one keeps less than a third of its contrast.
+/// Smallest squares: a corner's fit has four quarters of a square to look at. A marker's cell must stand out of the
+/// blur: of cells narrower than twice its sigma every other one keeps less than a third of its contrast.
 const LEAST_SQUARE_PX: f64 = 9.0;
 const LEAST_CELL_PX: f64 = 2.2;
 const LEAST_CELL_BLURS: f64 = 2.0;

@@ -1,5 +1,5 @@
-//! In: a camera solved with the plain lens (k1 k2 p1 p2 k3). Out: the same with one more family of terms (the sensor's tilt, thin
-//! prism, rational) where pictures that it was not solved from give reason for it.
+//! In: a camera solved with the plain lens (k1 k2 p1 p2 k3). Out: the same with one more family of terms (the
+//! sensor's tilt, thin prism, rational) where pictures that it was not solved from give reason for it.
 //! Frame and unit: the lens's own; px. docs/math.md, Camera calibration (10), (11).
 
 use super::held_out::{WORTH, gain, held_out};
@@ -10,7 +10,8 @@ use crate::calibrate::camera::ray_error::{expected_ray_error, rays_apart};
 use crate::camera::SKEW;
 use crate::solve::Solution;
 
-/// What a lens may have beside the plain terms, one at a time: together they are hardly told apart, and a person may ask for them.
+/// What a lens may have beside the plain terms, one at a time: together they are hardly told apart, and a person may
+/// ask for them.
 const FAMILIES: [Lens; 3] = [Lens::Scheimpflug, Lens::Prism, Lens::Rational];
 /// Fewer pictures say nothing of one another.
 const MIN_PICTURES: usize = 8;

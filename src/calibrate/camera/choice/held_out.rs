@@ -1,4 +1,5 @@
-//! In: two models of a camera and its boards. Out: whether pictures that neither was solved from fit better with the second.
+//! In: two models of a camera and its boards. Out: whether pictures that neither was solved from fit better with the
+//! second.
 //! Frame and unit: squares of the corners' sigmas. docs/math.md, Camera calibration (10).
 
 use crate::calibrate::camera::bundle::{Corner, State};
@@ -11,14 +12,14 @@ const PARTS: usize = 4;
 const SURE: f64 = 3.0;
 /// The same of what does no harm where it is taken in without need.
 const LIKELY: f64 = 2.0;
-/// Least share of the squared residuals that goes: what is less is the corners', whatever its odds. Of photographs by a plain lens
-/// rational terms explain between 0.5 and 2 %, three standard errors sure.
+/// Least share of the squared residuals that goes: what is less is the corners', whatever its odds. Of photographs by
+/// a plain lens rational terms explain between 0.5 and 2 %, three standard errors sure.
 pub(super) const WORTH: f64 = 0.02;
 /// Residuals beyond this many sigmas say no more.
 const FAR: f64 = 3.0;
 
-/// Mean squared residual of each picture, in squares of the corners' sigmas, with the camera and the shape of others and its own pose.
-/// `sigma0` is the plainest model's: all are cut off alike.
+/// Mean squared residual of each picture, in squares of the corners' sigmas, with the camera and the shape of others
+/// and its own pose. `sigma0` is the plainest model's: all are cut off alike.
 pub(super) fn held_out(fit: &Fit<'_>, solution: &Solution<State>, held: &[usize], sigma0: f64) -> Vec<f64> {
     let far = (FAR * sigma0).powi(2);
     let mut scores = vec![0.0; fit.corners.len()];

@@ -1,5 +1,5 @@
-//! In: a camera solved with the plain lens from a board as drawn. Out: the same with what the pictures give reason for: the board's
-//! shape, further terms of the lens; without the terms that they do not tell from zero.
+//! In: a camera solved with the plain lens from a board as drawn. Out: the same with what the pictures give reason
+//! for: the board's shape, further terms of the lens; without the terms that they do not tell from zero.
 //! Frame and unit: the lens's own; px, mm.
 
 mod evidence;

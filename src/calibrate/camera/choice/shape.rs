@@ -1,5 +1,5 @@
-//! In: a camera solved from a board as drawn. Out: the same with the board's shape beside it, where pictures that neither was solved
-//! from give reason for it.
+//! In: a camera solved from a board as drawn. Out: the same with the board's shape beside it, where pictures that
+//! neither was solved from give reason for it.
 //! Frame and unit: board frame, mm; px. docs/math.md, Camera calibration (12), (13).
 
 use super::held_out::{WORTH, held_out, surely_lower};
@@ -11,7 +11,8 @@ use crate::solve::Solution;
 
 /// Fewer pictures say little of one another, and of six the camera is off by up to 1.7 of what is stated.
 const MIN_PICTURES: usize = 8;
-/// Usual size of a coefficient before the pictures tell it, over half of the board's length: more than print and plate ever are off.
+/// Usual size of a coefficient before the pictures tell it, over half of the board's length: more than print and
+/// plate ever are off.
 const FIRST: f64 = 0.01;
 /// Least of it: below, a coefficient is held for all that matters.
 const LEAST: f64 = 1e-7;
@@ -72,8 +73,8 @@ pub(in crate::calibrate::camera) fn resized(fit: &mut Fit<'_>, solution: &mut So
     }
 }
 
-/// Sizes that follow from the coefficients and coefficients that follow from the sizes, by turns \[mackay92\]. `None` where the
-/// pictures do not determine the camera.
+/// Sizes that follow from the coefficients and coefficients that follow from the sizes, by turns \[mackay92\]. `None`
+/// where the pictures do not determine the camera.
 fn settled(fit: &mut Fit<'_>, mut solution: Solution<State>, held: &[usize]) -> Option<Solution<State>> {
     for _ in 0..ROUNDS {
         let bent = fit.bent.as_mut()?;
@@ -88,7 +89,8 @@ fn settled(fit: &mut Fit<'_>, mut solution: Solution<State>, held: &[usize]) -> 
     fit.fine(held, solution.state).so_far()
 }
 
-/// Usual size of the coefficients in the plane and out of it: their squares over the number of them that the pictures determine.
+/// Usual size of the coefficients in the plane and out of it: their squares over the number of them that the pictures
+/// determine.
 fn sizes(bent: &Bent, solution: &Solution<State>) -> Option<[f64; 2]> {
     let covariance = solution.covariance.as_ref()?;
     let of = |lifts: bool| {

@@ -90,8 +90,8 @@ fn said(what: &str, e: &GenicamError) -> Fault {
             .next("end the other program (a viewer, another sheetlight), or wait until its heartbeat runs out");
     }
     Fault::input(what)
-        .cause("the network, or a camera that does it in another way than the standard")
-        .next("see what it answers: sheetlight camera show")
+        .cause("the network, or a camera that differs from the standard")
+        .next("check it with: sheetlight camera show")
 }
 
 fn serial(device: &DeviceInfo) -> String {
@@ -99,7 +99,8 @@ fn serial(device: &DeviceInfo) -> String {
 }
 
 impl GigeCamera {
-    /// Takes control of the camera; it sends nothing yet. `packet`: bytes of a packet; none: as large as the network carries.
+    /// Takes control of the camera; it sends nothing yet. `packet`: bytes of a packet; none: as large as the network
+    /// carries.
     ///
     /// # Errors
     /// No such camera, or one that is in use, or whose pixels are not grey.
@@ -188,7 +189,7 @@ impl GigeCamera {
         let host_ns = now_ns();
         self.heard = Instant::now();
         let Some(id) = self.numbers.on_from(frame.block_id) else {
-            return self.gone(&format!("its count began anew, at {}: it was reset", frame.block_id));
+            return self.gone(&format!("its count began again, at {}: it was reset", frame.block_id));
         };
         if !frame.is_complete() {
             return Event::Incomplete { id, why: format!("{:?}", frame.status) };
@@ -216,7 +217,7 @@ impl GigeCamera {
         Event::Lost(
             Fault::input(format!("gige://{}: {what}", self.word))
                 .cause("its cable or power is out, or another program took it")
-                .next("plug it in; a running command goes on by itself"),
+                .next("plug it in; a running command continues automatically"),
         )
     }
 }
@@ -293,7 +294,7 @@ impl PictureSource for GigeCamera {
         let Some(feature) = self.feature(name) else {
             return Err(Fault::usage(format!("gige://{}: has no feature {name}", self.word))
                 .cause("a misspelt name, or a camera without it")
-                .next("see what it has: sheetlight camera show"));
+                .next("list its features with: sheetlight camera show"));
         };
         let refuse = |why: String| {
             Err(Fault::usage(format!("{name} cannot be set to {value}: {why}"))
@@ -370,7 +371,8 @@ impl GigeCamera {
         SETTINGS.iter().filter_map(kept).collect()
     }
 
-    /// What this camera calls a standard feature: cameras from before the standard's second version have names of their own.
+    /// What this camera calls a standard feature: cameras from before the standard's second version have names of
+    /// their own.
     fn own_name<'a>(&self, name: &'a str) -> &'a str {
         let has = |n: &&str| self.camera.nodemap().node(n).is_some();
         let former = FORMER.iter().filter(|(now, _)| *now == name).map(|(_, then)| *then);

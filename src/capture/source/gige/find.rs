@@ -65,8 +65,14 @@ pub fn found() -> Result<Vec<Found>> {
 pub fn find(word: &str) -> Result<DeviceInfo> {
     let none = |asked: String| {
         Fault::input(format!("no camera found: {asked}"))
-            .cause("it has no power or no cable, its address is of another network, or a firewall drops UDP (port 3956 and the stream's)")
-            .next("see who answers: sheetlight camera list; let UDP from the camera through, and give both ends addresses of one network")
+            .cause(
+                "it has no power or no cable, its address is of another network, or a firewall drops UDP (port \
+                    3956 and the stream's)",
+            )
+            .next(
+                "list the cameras with: sheetlight camera list; let UDP from the camera through, and give both \
+                   ends addresses of one network",
+            )
     };
     if let Ok(ip) = word.parse::<Ipv4Addr>() {
         let answered = blocking::discover_ip(ip, PATIENCE);

@@ -1,4 +1,5 @@
-//! In: the numbers of a camera's pictures as they came over the wire. Out: numbers that go on where 16 bits end; whether the count began anew.
+//! In: the numbers of a camera's pictures as they came over the wire. Out: numbers that go on where 16 bits end;
+//! whether the count began anew.
 //! Frame and unit: pictures.
 
 /// Numbers of 16 bits go from 65535 on to 1: GigE Vision leaves 0 out. A camera that was seen to use 0 goes on to 0.

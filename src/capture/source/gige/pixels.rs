@@ -42,7 +42,10 @@ pub fn depth(format: &str) -> Result<u8> {
     layout(format).map(|(bits, _)| bits).ok_or_else(|| {
         Fault::input(format!("the camera's pixel format is {format}"))
             .cause("a colour camera, or one that interpolates colours itself")
-            .next("set a grey one: sheetlight camera set PixelFormat Mono8 (or Mono10, Mono12, Mono16 and their packed forms)")
+            .next(
+                "set a grey one: sheetlight camera set PixelFormat Mono8 (or Mono10, Mono12, Mono16 and their \
+                   packed forms)",
+            )
     })
 }
 

@@ -1,5 +1,5 @@
-//! In: places of one shot's line, each with its distance from its neighbours' surface. Out: one such place for each half of the line, the
-//! usual one, whatever steps and edges lie under the rest.
+//! In: places of one shot's line, each with its distance from its neighbours' surface. Out: one such place for each
+//! half of the line, the usual one, whatever steps and edges lie under the rest.
 //! Frame and unit: the cloud's frame, mm.
 
 use crate::geometry::Vec3;

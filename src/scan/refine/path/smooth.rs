@@ -1,11 +1,13 @@
-//! In: numbers along a path, seen from each of its places. Out: by how much each place lies off the smooth path through its neighbours.
+//! In: numbers along a path, seen from each of its places. Out: by how much each place lies off the smooth path
+//! through its neighbours.
 //! Frame and unit: the caller's; docs/math.md, Places that scatter (1) and (2).
 
 use crate::solve::robust_scale;
 
 /// Half windows, in shots to each side.
 const WINDOWS: [usize; 6] = [2, 4, 8, 16, 32, 64];
-/// A wider window is believed while what it says lies within so many standard deviations of what all narrower ones said.
+/// A wider window is believed while what it says lies within so many standard deviations of what all narrower ones
+/// said.
 const AGREE: f64 = 2.0;
 /// A place that lies farther off, in standard deviations, is where the path jumps: that is no scatter.
 const JUMP: f64 = 4.0;
@@ -27,14 +29,16 @@ pub(super) struct Departures<const N: usize> {
     pub off: Vec<[f64; N]>,
 }
 
-/// By how much each number of a place scatters about the straight line through its two neighbours' own: standard deviation of one place.
+/// By how much each number of a place scatters about the straight line through its two neighbours' own: standard
+/// deviation of one place.
 pub(super) fn scatter<const N: usize>(places: usize, around: impl Fn(usize, usize) -> Around<N>) -> [f64; N] {
     let near: Vec<[f64; N]> = (1..places.saturating_sub(1)).filter_map(|k| off_the_chord(&around(k, 1))).collect();
     std::array::from_fn(|i| robust_scale(&mut near.iter().map(|off| off[i].abs()).collect::<Vec<f64>>(), 1))
 }
 
-/// `around(k, reach)` lists the places up to `reach` before and after place k, itself among them with 0. Lines through windows that grow until
-/// they disagree with narrower ones: intersection of confidence intervals [goldenshluger97], so that bends stay what they are.
+/// `around(k, reach)` lists the places up to `reach` before and after place k, itself among them with 0. Lines
+/// through windows that grow until they disagree with narrower ones: intersection of confidence intervals
+/// [goldenshluger97], so that bends stay what they are.
 pub(super) fn departures<const N: usize>(places: usize, around: impl Fn(usize, usize) -> Around<N>) -> Departures<N> {
     let sigma = scatter(places, &around);
     let off: Vec<[f64; N]> = (0..places).map(|k| smoothed(&around(k, REACH), sigma)).collect();
@@ -42,8 +46,8 @@ pub(super) fn departures<const N: usize>(places: usize, around: impl Fn(usize, u
     Departures { sigma, off }
 }
 
-/// What of a departure is scatter: a bend that a window cut short lies in all departures there alike, and no surface tells it from its own
-/// height. Smoothed once more and taken away (Tukey's twicing).
+/// What of a departure is scatter: a bend that a window cut short lies in all departures there alike, and no surface
+/// tells it from its own height. Smoothed once more and taken away (Tukey's twicing).
 fn scattered<const N: usize>(off: &[[f64; N]], k: usize) -> [f64; N] {
     let near = k.saturating_sub(BEND)..(k + BEND + 1).min(off.len());
     let window: Vec<(f64, [f64; N])> = near.map(|j| (j as f64 - k as f64, off[j])).collect();
@@ -83,7 +87,8 @@ fn smoothed<const N: usize>(around: &Around<N>, sigma: [f64; N]) -> [f64; N] {
     std::array::from_fn(|i| if off[i].abs() > JUMP * sigma[i] { 0.0 } else { off[i] })
 }
 
-/// Least squares line through a window, at 0, and its standard deviation for places that scatter by 1; `None` for fewer than three.
+/// Least squares line through a window, at 0, and its standard deviation for places that scatter by 1; `None` for
+/// fewer than three.
 fn line_at_zero<const N: usize>(window: &[(f64, [f64; N])]) -> Option<([f64; N], f64)> {
     let n = window.len() as f64;
     let mean = window.iter().map(|(x, _)| x).sum::<f64>() / n;

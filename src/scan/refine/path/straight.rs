@@ -1,5 +1,5 @@
-//! In: a cloud, where the camera was reported at its shots. Out: how much the reported places scatter about a smooth path, how much of that
-//! the surface does not show, and the places and points without it.
+//! In: a cloud, where the camera was reported at its shots. Out: how much the reported places scatter about a smooth
+//! path, how much of that the surface does not show, and the places and points without it.
 //! Frame and unit: the cloud's frame, mm, rad; docs/math.md, Places that scatter.
 
 use super::super::slope::slope;
@@ -23,8 +23,8 @@ pub struct PathFound {
     pub height_mm: f64,
     /// The same of its turn that lifts one end of the stripe, degrees.
     pub roll_deg: f64,
-    /// Share of that scatter which the surface does not follow, so that it is the report's: 0 where the camera moved as it was reported, 1 where
-    /// it went smoothly.
+    /// Share of that scatter which the surface does not follow, so that it is the report's: 0 where the camera moved
+    /// as it was reported, 1 where it went smoothly.
     pub share: f64,
     /// Its standard deviation.
     pub share_sigma: f64,
@@ -45,7 +45,8 @@ impl std::fmt::Display for PathFound {
 pub struct Straight {
     /// The figures.
     pub found: PathFound,
-    /// Of each shot where the camera was, and the motion of its points from where it was reported; empty where nothing is taken out.
+    /// Of each shot where the camera was, and the motion of its points from where it was reported; empty where
+    /// nothing is taken out.
     moved: BTreeMap<u32, (Rigid<Base, Camera>, Rigid<Base, Base>)>,
 }
 
@@ -59,8 +60,8 @@ struct Seen {
     roll: Vec3,
 }
 
-/// Looks at a cloud in the order of its shots, of pictures with so many pixels along the stripe; `None` where the places are exact or few, or
-/// no surface shows how they stood.
+/// Looks at a cloud in the order of its shots, of pictures with so many pixels along the stripe; `None` where the
+/// places are exact or few, or no surface shows how they stood.
 pub fn straight(cloud: &dyn PointSource, shots: &Shots, pixels_along: u32) -> Result<Option<Straight>> {
     let places: Vec<(u32, Rigid<Base, Camera>)> = shots.places().collect();
     let around = |k: usize, reach: usize| around(&places, k, reach, |t| t.vector().into());
@@ -148,7 +149,8 @@ impl Seen {
         Rigid::new(turn, self.anchor - turn * self.anchor + self.height * height)
     }
 
-    /// By how much a shot would rise over the surface between its neighbours, were all three where the smooth path has them, mm.
+    /// By how much a shot would rise over the surface between its neighbours, were all three where the smooth path
+    /// has them, mm.
     fn lift(&self, step: &Step, shots: &Shots, off: &BTreeMap<u32, [f64; 2]>) -> f64 {
         let parts = [1.0, step.after - 1.0, -step.after];
         let of = |(shot, part): (u32, f64)| {
@@ -174,7 +176,8 @@ mod tests {
     struct Scene {
         shots: u32,
         along: Along,
-        /// How far the report scatters from where the camera is, and the camera from its path, mm; as many hundredths of a degree.
+        /// How far the report scatters from where the camera is, and the camera from its path, mm; as many hundredths
+        /// of a degree.
         report: f64,
         motion: f64,
         surface: fn(f64, f64) -> f64,
@@ -194,7 +197,8 @@ mod tests {
     }
 
     impl Scene {
-        /// The cloud as it was reported, where the camera was reported, and the distance of each point from the surface after `straight`.
+        /// The cloud as it was reported, where the camera was reported, and the distance of each point from the
+        /// surface after `straight`.
         fn scan(&self, seed: u64) -> (Vec<CloudPoint>, Shots) {
             let mut noise = Noise(seed);
             let (mut cloud, mut places) = (Vec::new(), Vec::new());
@@ -289,7 +293,8 @@ mod tests {
         assert!(after < 0.9 * before, "{before} -> {after}");
     }
 
-    /// Grooves along the stripe, as far apart as three shots, are the part's: with a report that is exact, and with one that scatters.
+    /// Grooves along the stripe, as far apart as three shots, are the part's: with a report that is exact, and with
+    /// one that scatters.
     #[test]
     fn grooves_along_the_stripe_stay() {
         let surface = |_: f64, y: f64| 0.02 * (y / (3.0 * STEP) * std::f64::consts::TAU).sin();
@@ -300,7 +305,8 @@ mod tests {
         assert!(found.unwrap().taken_out && after < 0.7 * before);
     }
 
-    /// What shows nothing changes nothing: few shots, a report that is exact, a camera that stands, a surface that is noise.
+    /// What shows nothing changes nothing: few shots, a report that is exact, a camera that stands, a surface that is
+    /// noise.
     #[test]
     fn where_nothing_is_shown_nothing_is_done() {
         let told = |scene: Scene| scene.straight(2).0.is_some_and(|f| f.taken_out);

@@ -1,5 +1,5 @@
-//! In: a cloud, shot by shot. Out: by how much each shot's line over a surface stands off the surface between the shots before and
-//! after, left and right of its middle.
+//! In: a cloud, shot by shot. Out: by how much each shot's line over a surface stands off the surface between the
+//! shots before and after, left and right of its middle.
 //! Frame and unit: the cloud's frame, mm; docs/math.md, Places that scatter (3).
 
 use super::sides::{Side, halves};

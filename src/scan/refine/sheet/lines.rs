@@ -1,5 +1,5 @@
-//! In: a cloud, shot by shot. Out: each shot's line with, for each of its points, how fast the light grows from shot to shot there and how far
-//! the point moves along its ray when the sheet does.
+//! In: a cloud, shot by shot. Out: each shot's line with, for each of its points, how fast the light grows from shot
+//! to shot there and how far the point moves along its ray when the sheet does.
 //! Frame and unit: the cloud's frame, mm; docs/math.md, Sheets that are thick (2) and (3).
 
 use crate::fault::Result;
@@ -12,8 +12,8 @@ use std::sync::Arc;
 const BESIDE_PX: f32 = 1.5;
 /// Stripes that are narrower, or that nobody measured, px: centres of one surface lie closer than a pixel.
 const LEAST_PX: f32 = 1.0;
-/// Light that changes by more than this from one shot to the next, as a logarithm, counts as this: it ends there, and where between the two
-/// nobody knows.
+/// Light that changes by more than this from one shot to the next, as a logarithm, counts as this: it ends there, and
+/// where between the two nobody knows.
 const MOST: f64 = 1.5;
 
 /// What a point's neighbours in the shots before and after say of it.
@@ -21,7 +21,8 @@ const MOST: f64 = 1.5;
 pub(super) struct Pull {
     /// Change of the light's logarithm from shot to shot.
     pub change: f64,
-    /// By how much that of the point lies below the mean of its neighbours': light that falls on an edge, or on a line thinner than the shots show.
+    /// By how much that of the point lies below the mean of its neighbours': light that falls on an edge, or on a
+    /// line thinner than the shots show.
     pub dip: f64,
     /// How the point moves for a change of 1 and a sheet of variance 1 mm².
     pub per: Vec3,
@@ -96,9 +97,9 @@ impl Line {
         self.beside(p).min_by(|a, b| square(a).total_cmp(&square(b))).map(|(i, _, _)| i)
     }
 
-    /// Logarithm of the light beside a point of another line, and how much of it is there, 0..=1: a mean whose weights have no steps, so that it
-    /// has none where this line's points lie a little otherwise. What lies widths of the stripe away across it is of another surface, and counts for
-    /// little.
+    /// Logarithm of the light beside a point of another line, and how much of it is there, 0..=1: a mean whose
+    /// weights have no steps, so that it has none where this line's points lie a little otherwise. What lies widths
+    /// of the stripe away across it is of another surface, and counts for little.
     fn light(&self, p: &CloudPoint) -> (f64, f64) {
         let (mut sum, mut sure, mut all) = (0.0, 0.0, 0.0);
         for (i, along, across) in self.beside(p) {
@@ -118,7 +119,8 @@ impl Line {
         let (at, here) = (p.at(), self.light(p).0);
         let Some(Place { eye, sheet }) = &self.place else { return Pull::default() };
         let ray = at - eye;
-        // How much brighter a line is beside the point, how far its sheet stands from the point along the normal, and how much that counts.
+        // How much brighter a line is beside the point, how far its sheet stands from the point along the normal, and
+        // how much that counts.
         let beside = |line: Option<&Line>| {
             let line = line?;
             let way = -line.place.as_ref()?.sheet.distance(&at);

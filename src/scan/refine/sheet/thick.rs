@@ -1,5 +1,5 @@
-//! In: a scan's lines with what those beside them say. Out: the sheet's thickness as the cloud shows it, and the points without what it does
-//! where brightness changes.
+//! In: a scan's lines with what those beside them say. Out: the sheet's thickness as the cloud shows it, and the
+//! points without what it does where brightness changes.
 //! Frame and unit: the cloud's frame, mm; docs/math.md, Sheets that are thick.
 
 use super::super::slope::{Slope, slope};
@@ -9,13 +9,15 @@ use crate::scan::{CloudPoint, PointSource, Shots};
 use crate::solve::robust_scale;
 use std::collections::VecDeque;
 
-/// A point is compared with those beside it where it lies between them, no nearer to one of them than this share of their distance.
+/// A point is compared with those beside it where it lies between them, no nearer to one of them than this share of
+/// their distance.
 const BETWEEN: f64 = 0.2;
 /// And where their depths differ by less than this share of it: an edge says nothing.
 const LEVEL: f64 = 0.6;
 /// What lies farther off than so many robust deviations is an edge.
 const EDGE: f64 = 10.0;
-/// Changes of light from shot to shot within so many of their robust deviations are speckle and noise: a point in 80 of pure noise is moved.
+/// Changes of light from shot to shot within so many of their robust deviations are speckle and noise: a point in 80
+/// of pure noise is moved.
 const SPECKLE: f64 = 2.5;
 /// But none beyond this: where most of a surface is printed, they are the print.
 const UNCHANGED: f64 = 0.25;
@@ -29,12 +31,13 @@ const ROUNDS: usize = 5;
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SheetFound {
-    /// The standard deviation across of the sheet that it acts as, mm: within 0.7 and 1.6 of the real one, less where shots lie farther apart than
-    /// three of those.
+    /// The standard deviation across of the sheet that it acts as, mm: within 0.7 and 1.6 of the real one, less where
+    /// shots lie farther apart than three of those.
     pub thickness_mm: f64,
     /// Standard deviation of that.
     pub thickness_sigma_mm: f64,
-    /// What is left where brightness changes scatters as a sheet of this standard deviation pulls, mm; it is in the points' sigma.
+    /// What is left where brightness changes scatters as a sheet of this standard deviation pulls, mm; it is in the
+    /// points' sigma.
     pub scatter_mm: f64,
     /// Share of the points that were moved by more than their standard deviation.
     pub moved: f64,
@@ -45,7 +48,8 @@ impl std::fmt::Display for SheetFound {
         let SheetFound { thickness_mm, thickness_sigma_mm, scatter_mm, moved } = self;
         write!(
             f,
-            "where brightness changes the sheet acts as one of {thickness_mm:.3} +- {thickness_sigma_mm:.3} mm (1 sigma): "
+            "where brightness changes the sheet acts as one of {thickness_mm:.3} +- {thickness_sigma_mm:.3} mm (1 \
+             sigma): "
         )?;
         write!(f, "taken out, of {:.1} % of the points more than their standard deviation; ", 100.0 * moved)?;
         write!(f, "what is left scatters as one of {scatter_mm:.3} mm pulls, which is in the points' sigma")
@@ -89,7 +93,8 @@ struct Between {
 }
 
 impl Thick {
-    /// Looks at a cloud in the order of its shots; `None` where nobody wrote the sheet down, or where it does not show that brightness pulls its points.
+    /// Looks at a cloud in the order of its shots; `None` where nobody wrote the sheet down, or where it does not
+    /// show that brightness pulls its points.
     pub fn of(cloud: &dyn PointSource, shots: &Shots) -> Result<Option<Thick>> {
         let (mut all, mut every, mut seen) = (Vec::new(), 1, 0_usize);
         let mut three: VecDeque<Pulled> = VecDeque::new();
@@ -172,16 +177,17 @@ impl Quiet {
     }
 }
 
-/// A number beyond twice a size, nothing within it, and what leads from one to the other without a step, so that nothing hangs on which side of one
-/// it lies.
+/// A number beyond twice a size, nothing within it, and what leads from one to the other without a step, so that
+/// nothing hangs on which side of one it lies.
 fn beyond(number: f64, size: f64) -> f64 {
     let over = number.abs() - size;
     number.signum() * (2.0 * over).clamp(0.0, number.abs())
 }
 
-/// By how much points scatter where brightness changes, as a variance of the sheet: of (sum of squares of what is unsure, rest, its stated variance) what
-/// the squared rests grow by beyond that variance as most of them have it, each as heavy as chance lets it be. No less than a sheet of variance `square`
-/// moves them by: of a surface that is printed all over most hold pulls already.
+/// By how much points scatter where brightness changes, as a variance of the sheet: of (sum of squares of what is
+/// unsure, rest, its stated variance) what the squared rests grow by beyond that variance as most of them have it,
+/// each as heavy as chance lets it be. No less than a sheet of variance `square` moves them by: of a surface that is
+/// printed all over most hold pulls already.
 fn left(rests: &[[f64; 3]], square: f64) -> f64 {
     let mut over: Vec<f64> = rests.iter().map(|[_, rest, stated]| rest.abs() / stated.sqrt()).collect();
     let usual = robust_scale(&mut over, 1).powi(2);
@@ -281,8 +287,8 @@ mod tests {
     }
 
     impl Scene {
-        /// Light falls on the surface as a Gaussian about the sheet's middle and comes back as the surface is bright; a point lies where the
-        /// sheet's middle meets the ray of that light's centre.
+        /// Light falls on the surface as a Gaussian about the sheet's middle and comes back as the surface is bright;
+        /// a point lies where the sheet's middle meets the ray of that light's centre.
         fn scan(&self, seed: u64) -> (Vec<CloudPoint>, Shots) {
             let mut noise = Noise(seed);
             let (mut cloud, mut places) = (Vec::new(), Vec::new());
@@ -435,8 +441,8 @@ mod tests {
         assert!((0.2..0.7).contains(&moved) && (0.1..0.2).contains(&scatter_mm), "{moved}, {scatter_mm}");
     }
 
-    /// Where nothing pulls, nothing is moved: even light, speckle, a laser that flickers, a sheet that is thin, ridges that are bright, few shots,
-    /// shots that nobody knows the places of.
+    /// Where nothing pulls, nothing is moved: even light, speckle, a laser that flickers, a sheet that is thin,
+    /// ridges that are bright, few shots, shots that nobody knows the places of.
     #[test]
     fn what_is_not_pulled_is_not_moved() {
         let even = Scene { albedo: |_, _| 1.0, ..PRINTED };

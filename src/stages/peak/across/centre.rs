@@ -1,17 +1,19 @@
-//! In: a picture, a skeleton pixel, the expected stripe. Out: the pixel of its middle, where the skeleton runs beside that.
+//! In: a picture, a skeleton pixel, the expected stripe. Out: the pixel of its middle, where the skeleton runs beside
+//! that.
 //! Frame and unit: pixels. docs/math.md, Stripe peak (0).
 
 use crate::stages::peak::PeakFrame;
 use crate::stages::peak::grey::Grey;
 
-/// Of narrower stripes the skeleton is near enough to the middle, px: at 4 px (rendered LED at 4096x3072) half of the errors are 2 % smaller
-/// where it is moved, and beside edges the large ones 3 % larger.
+/// Of narrower stripes the skeleton is near enough to the middle, px: at 4 px (rendered LED at 4096x3072) half of the
+/// errors are 2 % smaller where it is moved, and beside edges the large ones 3 % larger.
 pub(in crate::stages) const BROAD: f32 = 4.5;
 
-/// The middle of a wide stripe on a skeleton pixel's line across. Thinning wears a stripe off from its edges, and speckle makes those ragged: the
-/// skeleton of a stripe of 9 px runs 10 px and more beside its middle, where a profile of three widths leaves a flank out and the level beside
-/// the stripe is that of its own light. Centre of gravity of three widths on three lines, in whole numbers; what is nearer than half a
-/// width stays where it is, and what lies between two stripes is no middle.
+/// The middle of a wide stripe on a skeleton pixel's line across. Thinning wears a stripe off from its edges, and
+/// speckle makes those ragged: the skeleton of a stripe of 9 px runs 10 px and more beside its middle, where a
+/// profile of three widths leaves a flank out and the level beside the stripe is that of its own light. Centre of
+/// gravity of three widths on three lines, in whole numbers; what is nearer than half a width stays where it is, and
+/// what lies between two stripes is no middle.
 #[inline(always)]
 pub(in crate::stages::peak) fn centred<G: Grey>(image: G, (x, y): (i32, i32), s: &PeakFrame) -> (i32, i32) {
     if s.s0 < BROAD {

@@ -7,11 +7,13 @@ use crate::stages::peak::grey::Grey;
 
 /// Directions that are taken in turn beside a border, each at a place that the one before led to.
 pub(in crate::stages) const BORDER_STEPS: u32 = 2;
-/// Share of a stripe's direction that leads out of the picture, from which on it leaves there; below, it runs along the border.
+/// Share of a stripe's direction that leads out of the picture, from which on it leaves there; below, it runs along
+/// the border.
 pub(in crate::stages) const LEAVES: f32 = 0.3;
 
-/// Direction across the stripe. Beside the picture's border differences reach beyond it, where all levels go on as on the border, and a slanted
-/// stripe would seem less so: there the direction is that of the stripe's next piece whose differences lie in the picture.
+/// Direction across the stripe. Beside the picture's border differences reach beyond it, where all levels go on as on
+/// the border, and a slanted stripe would seem less so: there the direction is that of the stripe's next piece whose
+/// differences lie in the picture.
 #[inline(always)]
 pub(in crate::stages::peak) fn direction<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) {
     let mut n = direction_at(image, x, y, s);
@@ -25,8 +27,8 @@ pub(in crate::stages::peak) fn direction<G: Grey>(image: G, x: i32, y: i32, s: &
     n
 }
 
-/// The next place along the stripe whose differences lie in the picture; the place itself where they do, or where the stripe runs along the
-/// border and there is none.
+/// The next place along the stripe whose differences lie in the picture; the place itself where they do, or where the
+/// stripe runs along the border and there is none.
 #[inline(always)]
 fn inward(x: i32, y: i32, n: (f32, f32), s: &PeakFrame) -> (i32, i32) {
     let reach = 3 * s.lattice_u.max(s.lattice_v);
@@ -41,7 +43,8 @@ fn inward(x: i32, y: i32, n: (f32, f32), s: &PeakFrame) -> (i32, i32) {
 }
 
 /// The strongest eigenvector of the structure tensor, on grey levels so far apart that noise
-/// of single pixels does not turn it, and what so far differences make of it is put right (docs/math.md, Stripe peak (1)).
+/// of single pixels does not turn it, and what so far differences make of it is put right (docs/math.md, Stripe peak
+/// (1)).
 #[inline(always)]
 fn direction_at<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) {
     let deep = (s.full_scale as u32).count_ones().max(10) - 10;
@@ -82,8 +85,9 @@ fn even<G: Grey>(image: G, x: i32, y: i32, u: i32) -> [i32; 4] {
     [image.whole(x - 3 * u, y), image.whole(x - u, y), image.whole(x + u, y), image.whole(x + 3 * u, y)]
 }
 
-/// Half the difference of the diagonal, the other element, and half the difference of the eigenvalues. Sums of whole numbers, of
-/// ten bits a gradient: which pixels a profile is made of hangs on the direction, and must not hang on rounding.
+/// Half the difference of the diagonal, the other element, and half the difference of the eigenvalues. Sums of whole
+/// numbers, of ten bits a gradient: which pixels a profile is made of hangs on the direction, and must not hang on
+/// rounding.
 #[inline(always)]
 fn tensor<G: Grey>(image: G, x: i32, y: i32, u: i32, v: i32, deep: u32) -> (f32, f32, f32) {
     let half = 1 << deep >> 1;

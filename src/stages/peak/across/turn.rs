@@ -1,9 +1,11 @@
-//! In: the stripe's sigma and the lattice that its direction is taken from. Out: by how much the structure tensor's direction is
-//! to be turned. Frame and unit: sigma and lattice in px; angles in rad from the image's v axis. docs/math.md, Stripe peak (1).
+//! In: the stripe's sigma and the lattice that its direction is taken from. Out: by how much the structure tensor's
+//! direction is to be turned. Frame and unit: sigma and lattice in px; angles in rad from the image's v axis.
+//! docs/math.md, Stripe peak (1).
 
 /// Angles that the correction is fitted to.
 const ANGLES: usize = 12;
-/// A stripe that is seen flatter than this, rad, keeps the lattice that is longer along it; the others take a square one.
+/// A stripe that is seen flatter than this, rad, keeps the lattice that is longer along it; the others take a square
+/// one.
 pub(in crate::stages::peak) const FLAT: f64 = 33.0 * std::f64::consts::PI / 180.0;
 
 /// Angle of the tensor's strongest direction on a straight Gaussian stripe whose normal is (sin a, cos a).
@@ -27,9 +29,10 @@ fn seen(a: f64, s0: f64, (u, v): (i32, i32)) -> f64 {
     0.5 * (2.0 * xy).atan2(yy - xx)
 }
 
-/// Differences over nearly three widths are no derivatives, and a lattice that is not square weighs them differently: the tensor's
-/// direction is off by up to 13 degrees, the same way on every stripe. Coefficients c of the turn sum c_k sin(k a), a the angle that
-/// was seen, for the multiples `k`; least squares over the angles from 0 to `up_to`, from the u axis where `rows`.
+/// Differences over nearly three widths are no derivatives, and a lattice that is not square weighs them differently:
+/// the tensor's direction is off by up to 13 degrees, the same way on every stripe. Coefficients c of the turn sum
+/// c_k sin(k a), a the angle that was seen, for the multiples `k`; least squares over the angles from 0 to `up_to`,
+/// from the u axis where `rows`.
 pub(in crate::stages::peak) fn turn<const N: usize>(
     s0: f32,
     lattice: (i32, i32),
@@ -51,14 +54,14 @@ pub(in crate::stages::peak) fn turn<const N: usize>(
     normal.cholesky().map_or([0.0; N], |c| std::array::from_fn(|j| c.solve(&right)[j] as f32))
 }
 
-/// Weights (1 - r² / 16)² of the gradients in 64ths: of the rows two above and two below the pixel, of its own, and of those one
-/// step away along both axes.
+/// Weights (1 - r² / 16)² of the gradients in 64ths: of the rows two above and two below the pixel, of its own, and
+/// of those one step away along both axes.
 pub(in crate::stages) const EVEN_ROW: [i32; 3] = [16, 36, 16];
 pub(in crate::stages) const MIDDLE_ROW: [i32; 3] = [36, 64, 36];
 pub(in crate::stages) const DIAGONAL: i32 = 49;
 
-/// Places of the gradients and their weights: every other one of a lattice, because a gradient looks at its four neighbours, which
-/// lie on the other colour of the board.
+/// Places of the gradients and their weights: every other one of a lattice, because a gradient looks at its four
+/// neighbours, which lie on the other colour of the board.
 const GRADIENTS: [(i32, i32, i32); 13] = [
     (0, 0, MIDDLE_ROW[1]),
     (-1, -1, DIAGONAL),

@@ -1,5 +1,6 @@
-//! In: light of a stripe, column by column along it, and the pixels of a fit. Out: how large the grains of its speckle are, and what they
-//! do to the fit: how much more a centre scatters than by pixels that are speckled by themselves.
+//! In: light of a stripe, column by column along it, and the pixels of a fit. Out: how large the grains of its
+//! speckle are, and what they do to the fit: how much more a centre scatters than by pixels that are speckled by
+//! themselves.
 //! Frame and unit: sigma of the blur that makes the grains, px. docs/math.md, Stripe peak (6).
 
 use super::scatter::most;
@@ -15,14 +16,15 @@ const LARGEST: f32 = 6.0;
 /// Share of the differences' squares that grains must explain before they are believed.
 const TELLING: f64 = 0.03;
 
-/// Correlation of the speckle of two pixels so far apart (square, px²): light through a blur of sigma s has intensities correlated as
-/// exp(-d² / (4 s²)).
+/// Correlation of the speckle of two pixels so far apart (square, px²): light through a blur of sigma s has
+/// intensities correlated as exp(-d² / (4 s²)).
 fn correlation(apart2: f32, grain: f32) -> f32 {
     (-0.25 * apart2 / (grain * grain)).exp()
 }
 
-/// Second differences of the centres of a stripe's columns at every distance along it, in squares. A slope of the line falls out of them,
-/// and so does what the surface makes of all of a column's light, as edges between dark and bright do.
+/// Second differences of the centres of a stripe's columns at every distance along it, in squares. A slope of the
+/// line falls out of them, and so does what the surface makes of all of a column's light, as edges between dark and
+/// bright do.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in super::super) struct Grains {
     squares: [f64; LAGS],
@@ -52,9 +54,10 @@ impl Grains {
     fn whole(&self) -> f64 {
         (0..LAGS).filter(|&k| self.n[k] > 0.0).map(|k| self.squares[k] / self.n[k]).sum()
     }
-    /// Sigma of all their grains, px; 0 where pixels scatter by themselves or nothing is told. A square is v (1 - (4 r(k) - r(2k)) / 3) on
-    /// average, r the correlation k columns apart: least squares over v and the grains' size. A line's bend has squares that grow as k⁴.
-    /// Peaks whose columns scatter more than noise does, with grains as they were known `before`, lie over an edge.
+    /// Sigma of all their grains, px; 0 where pixels scatter by themselves or nothing is told. A square is v (1 - (4
+    /// r(k) - r(2k)) / 3) on average, r the correlation k columns apart: least squares over v and the grains' size. A
+    /// line's bend has squares that grow as k⁴. Peaks whose columns scatter more than noise does, with grains as they
+    /// were known `before`, lie over an edge.
     pub fn sigma(mut all: Vec<Grains>, before: f32) -> f32 {
         all.retain(|g| g.n[0] > 0.0);
         all.sort_by(|a, b| a.whole().total_cmp(&b.whole()));
@@ -100,14 +103,15 @@ impl Grains {
     }
 }
 
-/// Squares of noise with such grains are correlated by r²: so many columns tell as much as one that is by itself. Of pixels, the square.
+/// Squares of noise with such grains are correlated by r²: so many columns tell as much as one that is by itself. Of
+/// pixels, the square.
 pub(in super::super) fn columns_of_a_grain(grain: f32) -> f64 {
     // Sum of exp(-d² / (2 s²)).
     (std::f64::consts::TAU.sqrt() * f64::from(grain)).max(1.0)
 }
 
-/// A pixel of a fit: where it is, column and row, the derivatives of its model by the three fitted numbers, its light, and its certainty,
-/// the weight over the variance.
+/// A pixel of a fit: where it is, column and row, the derivatives of its model by the three fitted numbers, its
+/// light, and its certainty, the weight over the variance.
 pub(in super::super) struct Cell {
     pub at: [i32; 2],
     pub j: Vector3<f32>,
@@ -130,9 +134,9 @@ pub(in super::super) fn pairs(pixels: usize, columns: usize, grain: f32) -> usiz
     (pixels / (stride * stride)) * (pixels * near.min(columns) / columns / (stride * stride)).max(1)
 }
 
-/// What a fit makes of speckle with grains: the share of each pixel's squares that it leaves, and the centre's variance over that from
-/// pixels that are speckled by themselves. The cells are those of every [`stride`], in order of their columns. `inverse` is the fit's
-/// (Jᵀ W J)⁻¹; its estimate is that times Jᵀ W e.
+/// What a fit makes of speckle with grains: the share of each pixel's squares that it leaves, and the centre's
+/// variance over that from pixels that are speckled by themselves. The cells are those of every [`stride`], in order
+/// of their columns. `inverse` is the fit's (Jᵀ W J)⁻¹; its estimate is that times Jᵀ W e.
 pub(in super::super) fn grained(cells: &[&Cell], inverse: &Matrix3<f32>, grain: f32) -> (Vec<f32>, f32) {
     let far = FAR * grain;
     let each = stride(grain).pow(2) as f32;

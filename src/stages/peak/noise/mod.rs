@@ -13,10 +13,11 @@ const MEDIAN: f32 = 0.826;
 /// What rounding adds to the square of the scatter, levels^2.
 const ROUNDING: f32 = 1.0 / 12.0;
 
-/// From second differences over two pixels, because neighbours may share a sensor's or a codec's smoothing. Their median: the
-/// stripe, edges and specks are few. Where black is cut off at 0, that many pixels scatter on one side only: the share of zeros,
-/// up to a half, puts it right to a fifth; of a picture that is mostly zeros this says too little. Whole levels stand for half a
-/// level to both sides: the median lies between them (Sheppard 1898), and what rounding adds is taken off.
+/// From second differences over two pixels, because neighbours may share a sensor's or a codec's smoothing. Their
+/// median: the stripe, edges and specks are few. Where black is cut off at 0, that many pixels scatter on one side
+/// only: the share of zeros, up to a half, puts it right to a fifth; of a picture that is mostly zeros this says too
+/// little. Whole levels stand for half a level to both sides: the median lies between them (Sheppard 1898), and what
+/// rounding adds is taken off.
 pub fn noise(image: &Image) -> f32 {
     let (w, h) = (image.width, image.height);
     let step = ((w * h / SAMPLES) as f32).sqrt().max(1.0) as u32;

@@ -1,5 +1,7 @@
-//! In: squared residuals of pixels whose light is known. Out: read noise, shot noise and speckle, which have scattered them.
-//! Frame and unit: grey levels of the picture's depth within, of an 8-bit picture in [`Scatter`]. docs/math.md, Stripe peak (6).
+//! In: squared residuals of pixels whose light is known. Out: read noise, shot noise and speckle, which have
+//! scattered them.
+//! Frame and unit: grey levels of the picture's depth within, of an 8-bit picture in [`Scatter`]. docs/math.md,
+//! Stripe peak (6).
 
 use crate::stages::peak::params::PeakParams;
 use nalgebra::{Matrix3, Vector3};
@@ -14,7 +16,8 @@ pub(in super::super) struct Scatter {
 
 /// Least read noise in steps of the picture's levels: rounding alone has a twelfth of their square.
 const ROUNDING: f32 = 0.3;
-/// So many pixels' worth of belief in the settings: where the light is the same everywhere, shot noise and speckle cannot be told apart.
+/// So many pixels' worth of belief in the settings: where the light is the same everywhere, shot noise and speckle
+/// cannot be told apart.
 const BELIEF: f64 = 10.0;
 
 /// A sum of squares farther out than so many of its standard deviations is not noise alone.
@@ -22,14 +25,15 @@ const SURE: f64 = 3.0;
 /// The lower quarter of a normal distribution ends so many standard deviations below its middle.
 const QUARTILE: f64 = 0.674;
 
-/// Squares that noise alone leaves at most, over those that it leaves the lower quarter at most: a sum of `free` squares, in units of
-/// that, scatters by sqrt(2 / free).
+/// Squares that noise alone leaves at most, over those that it leaves the lower quarter at most: a sum of `free`
+/// squares, in units of that, scatters by sqrt(2 / free).
 pub(in super::super) fn most(free: f64) -> f64 {
     let scatter = (2.0 / free.max(1.0)).sqrt().min(1.0);
     (1.0 + SURE * scatter) / (1.0 - QUARTILE * scatter)
 }
 
-/// Least squares of e² against left (r² + k level + c² light²) over some pixels, each in units of its expected variance.
+/// Least squares of e² against left (r² + k level + c² light²) over some pixels, each in units of its expected
+/// variance.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in super::super) struct Sums {
     normal: Matrix3<f64>,
@@ -40,8 +44,8 @@ pub(in super::super) struct Sums {
 }
 
 impl Sums {
-    /// A pixel of this `weight`: the shares of its variance and of its speckle's that a fit has left, its residual, its light above the background and
-    /// that, its variance as it was assumed.
+    /// A pixel of this `weight`: the shares of its variance and of its speckle's that a fit has left, its residual,
+    /// its light above the background and that, its variance as it was assumed.
     pub fn add(
         &mut self,
         weight: f32,
@@ -149,8 +153,8 @@ mod tests {
             let found = Scatter::fit(&sums, &assumed, full);
             let off = |a: f32, b: f32, least: f32| (a - b).abs() / b.max(least);
             assert!(off(found.speckle, truth.speckle, 0.1) < 0.15, "{found:?}, {truth:?}");
-            // What a pixel scatters by, in the dark, on the flank and on the crest, is what the fit weighs by. Where speckle drowns
-            // the other two they cannot be told apart, and need not be.
+            // What a pixel scatters by, in the dark, on the flank and on the crest, is what the fit weighs by. Where
+            // speckle drowns the other two they cannot be told apart, and need not be.
             for light in [0.0, 0.1, 0.4, 0.8].map(|share| share * full) {
                 let [seen, true_one] = [&found, &truth].map(|s| variance(s, light, 0.02 * full));
                 assert!(off(seen, true_one, 0.0) < 0.15, "light {light}: {seen} of {true_one}; {found:?}, {truth:?}");

@@ -1,4 +1,5 @@
-//! In: a picture, its lit pixels and their skeleton. Out: the skeleton with its ends carried to the edge of the surface.
+//! In: a picture, its lit pixels and their skeleton. Out: the skeleton with its ends carried to the edge of the
+//! surface.
 //! Frame and unit: pixels; brightness is compared with the stripe's own, so no grey level is set here.
 
 use crate::fault::{Fault, Result};

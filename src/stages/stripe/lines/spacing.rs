@@ -1,5 +1,5 @@
-//! In: the skeleton, lit pixels. Out: of each run of its pixels across the stripe the one in the middle, and every so many from it; a run's
-//! pixels follow one another within that distance. Lit pixels with no company are left out.
+//! In: the skeleton, lit pixels. Out: of each run of its pixels across the stripe the one in the middle, and every so
+//! many from it; a run's pixels follow one another within that distance. Lit pixels with no company are left out.
 //! Frame and unit: pixels; the distance follows from the stripe's width.
 
 use crate::gpu::Access::*;
@@ -12,14 +12,16 @@ use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 use glam::Vec2;
 
-/// A run that goes on for longer has no middle that can be found from here: its pixels are counted from the picture's border.
+/// A run that goes on for longer has no middle that can be found from here: its pixels are counted from the picture's
+/// border.
 pub(in crate::stages) const FAR: i32 = 32;
 
 /// Bit of the setting: a lit pixel with no other one near is no stripe's.
 ///
-/// One dark pixel in 740 exceeds three standard deviations of its noise. At 12 million pixels those are 17,000 fits, four times those of
-/// a stripe; 94 % of them have no other within three columns and rows. A stripe lights its pixels along itself: where the brightest of a column are
-/// lit in no more than half of the cases, six neighbours along it leave one in 64 by itself, and its flanks fewer.
+/// One dark pixel in 740 exceeds three standard deviations of its noise. At 12 million pixels those are 17,000 fits,
+/// four times those of a stripe; 94 % of them have no other within three columns and rows. A stripe lights its pixels
+/// along itself: where the brightest of a column are lit in no more than half of the cases, six neighbours along it
+/// leave one in 64 by itself, and its flanks fewer.
 pub const COMPANY: u32 = 1 << 17;
 /// Columns and rows on either side in which company is sought.
 pub(in crate::stages) const NEAR: i32 = 3;
@@ -27,12 +29,12 @@ pub(in crate::stages) const NEAR: i32 = 3;
 /// Up to here a skeleton hardly winds: 1.00 to 1.02 points a column.
 const NARROW_PX: f32 = 2.0;
 
-/// The setting as the stage takes it: pixels from one to the next, and from bit 16 on whether runs are sought along rows; 0 is
-/// off. [`COMPANY`] is a matter of its own.
+/// The setting as the stage takes it: pixels from one to the next, and from bit 16 on whether runs are sought along
+/// rows; 0 is off. [`COMPANY`] is a matter of its own.
 ///
-/// Speckle makes the skeleton of a wide stripe wind and branch. Its pixels across the stripe see the same light, so their fits
-/// find the same centre once more (at 4 px of sigma 1.9 points a column; every 1.5 widths leaves 1.1). A stripe narrower than
-/// 2 px keeps every pixel. `across`: unit image direction of depth.
+/// Speckle makes the skeleton of a wide stripe wind and branch. Its pixels across the stripe see the same light, so
+/// their fits find the same centre once more (at 4 px of sigma 1.9 points a column; every 1.5 widths leaves 1.1). A
+/// stripe narrower than 2 px keeps every pixel. `across`: unit image direction of depth.
 pub fn word(widths: f32, width_px: f32, across: Vec2) -> u32 {
     let step = (widths * width_px).floor();
     let rows = across[1].abs() < across[0].abs();
@@ -170,7 +172,8 @@ mod tests {
         assert!(of_column(20..180, 3).windows(2).filter(|w| w[1] - w[0] == 3).count() >= 50);
     }
 
-    /// Company is what is lit, not what is left of it: a blob thins to one pixel. At the border nothing beyond it counts.
+    /// Company is what is lit, not what is left of it: a blob thins to one pixel. At the border nothing beyond it
+    /// counts.
     #[test]
     fn lit_pixels_by_themselves_are_left_out() {
         let pixels = |places: &'static [(u32, u32)]| Mask::from_fn(40, 30, |x, y| places.contains(&(x, y)));

@@ -1,5 +1,7 @@
-//! In: a robot behind its rules, a camera with its lights, somebody who confirms. Out: the cell that a calibration drives.
-//! Frame and unit: base_from_flange, mm, mm/s. Every move is shown and confirmed; what the rules do not allow is not made.
+//! In: a robot behind its rules, a camera with its lights, somebody who confirms. Out: the cell that a calibration
+//! drives.
+//! Frame and unit: base_from_flange, mm, mm/s. Every move is shown and confirmed; what the rules do not allow is not
+//! made.
 
 use super::cell::{Cell, Light, Went};
 use crate::arm::rules::{Confirmation, Guard, Limits, Plan, Proposal, Straight};
@@ -48,7 +50,7 @@ impl<'a> ArmCell<'a> {
 
     fn limits(&self) -> Result<Limits> {
         self.guard.limits().cloned().ok_or_else(|| {
-            Fault::refused("no workspace is stated: nothing says where the arm may be")
+            Fault::refused("no workspace is stated: the limits of the arm are unknown")
                 .cause("station.toml has no [motion]")
                 .next("write [motion] with workspace = { from_mm = [...], to_mm = [...] } (docs/robots.md)")
         })
@@ -62,8 +64,8 @@ impl<'a> ArmCell<'a> {
             let proposal = self.guard.propose(plan.clone())?;
             if !proposal.passed() {
                 return Err(Fault::refused(proposal.missed().join("; "))
-                    .cause("what is named is not as it has to be")
-                    .next("put it right and begin again; the arm stands still"));
+                    .cause("a condition named above is not met")
+                    .next("correct it and begin again; the arm stands still"));
             }
             let ask = Ask { step: "calibrate", says: says.clone(), question: "go there?", proposal: &proposal };
             if let Some(confirmation) = self.operator.confirm(&ask)? {

@@ -25,7 +25,8 @@ pub enum Went {
     NotBegun(String),
 }
 
-/// A robot with the sensor on its flange. Who implements it keeps the motion rules: a move that they do not allow is not made.
+/// A robot with the sensor on its flange. Who implements it keeps the motion rules: a move that they do not allow is
+/// not made.
 pub trait Cell {
     /// Where the robot says that it stands.
     fn pose(&mut self) -> Result<Rigid<Base, Flange>>;

@@ -21,8 +21,8 @@ pub struct SelfCheck {
     pub expected_mm: f64,
 }
 
-/// Of stops whose stripe lies on the board at place 0; `calibration_mm` is the expected error of a scanned point. `None`
-/// where no stop shows a stripe.
+/// Of stops whose stripe lies on the board at place 0; `calibration_mm` is the expected error of a scanned point.
+/// `None` where no stop shows a stripe.
 pub fn check(fit: &JointFit, mount: Mount, shots: &[Shot], calibration_mm: f64) -> Option<SelfCheck> {
     let (mut squares, mut expected, mut points, mut stops) = (0.0, 0.0, 0usize, 0usize);
     let place = fit.state.far_from_board.first()?;

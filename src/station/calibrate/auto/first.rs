@@ -1,5 +1,5 @@
-//! In: a robot that sees a board. Out: small moves that keep it in view, and a first camera with its hand-eye transform from
-//! what the robot says of them.
+//! In: a robot that sees a board. Out: small moves that keep it in view, and a first camera with its hand-eye
+//! transform from what the robot says of them.
 //! Frame and unit: flange, mm, degrees; px.
 
 use super::cell::{Cell, Went};
@@ -80,8 +80,8 @@ pub fn moves(cell: &mut dyn Cell, home: &Rigid<Base, Flange>, book: &mut Noteboo
 const SHORTEST: f64 = 0.5;
 const STEPS: i32 = 45;
 
-/// The pinhole camera with which the robot's moves and the board's agree best. A focal length that is wrong puts the board at
-/// a wrong distance, and the robot's shifts say so.
+/// The pinhole camera with which the robot's moves and the board's agree best. A focal length that is wrong puts the
+/// board at a wrong distance, and the robot's shifts say so.
 pub fn camera(stops: &[Stop], mount: Mount, size: [u32; 2]) -> Result<Intrinsics> {
     let [width, height] = size;
     let long = f64::from(width.max(height));
@@ -106,18 +106,25 @@ pub fn camera(stops: &[Stop], mount: Mount, size: [u32; 2]) -> Result<Intrinsics
         .ok_or_else(|| {
             Fault::input("no camera explains how the board moved with the robot")
                 .cause(match mount {
-                    Mount::EyeInHand => "the board moved, the robot's poses are of another tool or in another unit, or the camera is not on the flange",
-                    Mount::EyeToHand => "the board slips on the flange, the robot's poses are of another tool or in another unit, or the camera moves",
+                    Mount::EyeInHand => {
+                        "the board moved, the robot's poses are of another tool or in another unit, \
+                                         or the camera is not on the flange"
+                    }
+                    Mount::EyeToHand => {
+                        "the board slips on the flange, the robot's poses are of another tool or in \
+                                         another unit, or the camera moves"
+                    }
                 })
                 .next(
-                    "check tool and work number of the controller (0), that the board is fast, and where the camera is \
+                    "check tool and work number of the controller (0), that the board is fixed, and where the camera \
+                     is \
                      (mount in station.toml)",
                 )
         })
 }
 
-/// What is known of any camera beforehand, so that few pictures do not run away: a principal point near the middle, a lens
-/// that bends moderately.
+/// What is known of any camera beforehand, so that few pictures do not run away: a principal point near the middle, a
+/// lens that bends moderately.
 pub fn usual(k: &Intrinsics) -> CameraCovariance {
     let (w, h) = (f64::from(k.width), f64::from(k.height));
     let sigmas = [0.2 * k.fx, 0.2 * k.fx, 0.05 * w, 0.05 * h, 0.3, 0.5, 0.005, 0.005, 0.5];

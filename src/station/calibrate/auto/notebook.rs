@@ -1,5 +1,5 @@
-//! In: stops, one after another. Out: two recordings of them (the stripe, the pointer's spot; the pictures in room light are the
-//! same), whole after every stop, so that `calibrate joint` comes to the same.
+//! In: stops, one after another. Out: two recordings of them (the stripe, the pointer's spot; the pictures in room
+//! light are the same), whole after every stop, so that `calibrate joint` comes to the same.
 //! Frame and unit: base_from_flange, mm; px.
 
 use super::cell::{Cell, Light};
@@ -50,8 +50,8 @@ impl Notebook {
         })
     }
 
-    /// Takes the pictures where the robot stands. `None` where the whole board is not found: nothing is kept, the reason is in
-    /// the second place.
+    /// Takes the pictures where the robot stands. `None` where the whole board is not found: nothing is kept, the
+    /// reason is in the second place.
     pub fn stop(&mut self, cell: &mut dyn Cell, pose: &Rigid<Base, Flange>) -> Result<(Option<usize>, String)> {
         let room = cell.picture(Light::Room)?;
         self.visits += 1;
@@ -61,7 +61,7 @@ impl Notebook {
             Err(fault) => return Ok((None, format!("{} ({})", fault.what, fault.cause))),
         };
         if view.ambiguous {
-            return Err(Fault::input("the board looks the same after a turn: where its origin is cannot be told")
+            return Err(Fault::input("the board looks the same after a turn: its origin is not determined")
                 .cause("a chessboard with even or odd numbers of corners both ways, or a symmetric circle grid")
                 .next("use a board with one even and one odd number of corners, or a ChArUco board"));
         }

@@ -17,10 +17,11 @@ pub struct AutoRun {
     pub out: PathBuf,
     /// Expected error of a scanned point at which it is enough, mm rms; above 0.
     pub target_mm: f64,
-    /// Poses at which pictures are taken at most, those of the check and those from which the board is not found included; 20..=200.
+    /// Poses at which pictures are taken at most, those of the check and those from which the board is not found
+    /// included; 20..=200.
     pub most: usize,
-    /// Depths between which points will be scanned, mm; where nobody states them a fifth to both sides of the board as it is
-    /// first seen.
+    /// Depths between which points will be scanned, mm; where nobody states them a fifth to both sides of the board
+    /// as it is first seen.
     pub working: Option<[f64; 2]>,
     /// Poses among which each next one is chosen; 20..=2000.
     pub candidates: usize,

@@ -1,5 +1,5 @@
-//! In: a cell, a board below its robot or on its flange, a target. Out: the rig, calibrated by moves of the program's own choice, checked on
-//! poses that no solve saw.
+//! In: a cell, a board below its robot or on its flange, a target. Out: the rig, calibrated by moves of the program's
+//! own choice, checked on poses that no solve saw.
 //! Frame and unit: mm, rad, px (docs/math.md, Joint calibration (9), (10)).
 
 use super::super::joint::measure::{Finders, unjudged};
@@ -34,8 +34,8 @@ const CHECK_ROUNDS: usize = 3;
 const FEWEST: usize = 14;
 /// So many predictions in a row that are wrong are no accident.
 const LOST: usize = 8;
-/// A move to a pose this near to one that the controller would not begin is not asked for again: share of the board's distance, and
-/// degrees.
+/// A move to a pose this near to one that the controller would not begin is not asked for again: share of the board's
+/// distance, and degrees.
 const NEAR: (f64, f64) = (0.15, 12.0);
 /// After so many refusals in a row the arm goes back to where it began, and after so many it is given up.
 const BACK: usize = 3;
@@ -67,12 +67,12 @@ struct Session<'a> {
     stuck: usize,
 }
 
-/// Calibrates camera, hand-eye, laser plane and pointer by itself. `told` hears of every stop: how many, and the error that is
-/// expected then.
+/// Calibrates camera, hand-eye, laser plane and pointer by itself. `told` hears of every stop: how many, and the
+/// error that is expected then.
 ///
 /// # Errors
-/// The board is not in the first picture, leaves the view with small moves, or moves; nothing explains what was seen; a move
-/// or a picture fails.
+/// The board is not in the first picture, leaves the view with small moves, or moves; nothing explains what was seen;
+/// a move or a picture fails.
 pub fn calibrate_auto(cell: &mut dyn Cell, rig: &Rig, run: &AutoRun, told: &dyn Fn(usize, f64)) -> Result<AutoResult> {
     run.check()?;
     let mut session = Session::begin(cell, rig, run)?;
@@ -148,7 +148,8 @@ impl<'a> Session<'a> {
         Ok(session)
     }
 
-    /// From where it began the sheet may pass beside the board: poses within the working depths, until stripes tell where it is.
+    /// From where it began the sheet may pass beside the board: poses within the working depths, until stripes tell
+    /// where it is.
     fn light(&mut self) -> Result<()> {
         for _ in 0..LIGHTS {
             if self.fit.has(Part::Stripe) {
@@ -251,8 +252,8 @@ impl<'a> Session<'a> {
         Ok(seen.map_or(Visit::Lost(why), Visit::Seen))
     }
 
-    /// The controller would not go there: that neighbourhood is not asked for again, and the arm, where it is stuck, goes back to
-    /// where it began.
+    /// The controller would not go there: that neighbourhood is not asked for again, and the arm, where it is stuck,
+    /// goes back to where it began.
     fn elsewhere(&mut self, to: Rigid<Base, Flange>, why: &str) -> Result<()> {
         self.refused.push(to);
         self.stuck += 1;
@@ -264,10 +265,10 @@ impl<'a> Session<'a> {
         if self.stuck.is_multiple_of(BACK) { self.home().map(drop) } else { Ok(()) }
     }
 
-    /// Back to where it began over the places that it came by: so the joints unwind as they were wound. Straight back would lead to the
-    /// same pose with a joint a turn further, from where the next motion may be out of the joint's range. Where a way cannot be gone
-    /// back, because the arm stands a little beside it, the way straight back or an earlier place is tried. False where none of them is
-    /// reached: it goes on from where it stands.
+    /// Back to where it began over the places that it came by: so the joints unwind as they were wound. Straight back
+    /// would lead to the same pose with a joint a turn further, from where the next motion may be out of the joint's
+    /// range. Where a way cannot be gone back, because the arm stands a little beside it, the way straight back or an
+    /// earlier place is tried. False where none of them is reached: it goes on from where it stands.
     fn home(&mut self) -> Result<bool> {
         let began = self.trail[0];
         let mut there = true;
@@ -306,7 +307,7 @@ impl<'a> Session<'a> {
         let moved = self.fit.left_out.iter().filter(|l| l.part == Part::RobotPlace).count();
         if moved * 4 > self.shots.len() {
             return Err(Fault::input(format!(
-                "the board does not stand still: at {moved} of {} stops it is not where the others say",
+                "the board moved: at {moved} of {} stops it is not where the others show it",
                 self.shots.len()
             ))
             .cause("it was moved or slips, or the robot's poses are of another tool or work frame")
@@ -350,8 +351,11 @@ fn alike(a: &Rigid<Base, Flange>, b: &Rigid<Base, Flange>, distance: f64) -> boo
 }
 
 fn lost(why: &str) -> Fault {
-    Fault::input(format!("the board was not found at {LOST} poses in a row from which it ought to be seen: {why}"))
-        .cause("its squares or markers are too small at this distance, it is hidden or badly lit, or the poses are not the flange's")
+    Fault::input(format!("the board was not found at {LOST} poses in a row from which it should be visible: {why}"))
+        .cause(
+            "its squares or markers are too small at this distance, it is hidden or badly lit, or the poses are \
+                not the flange's",
+        )
         .next("take a board of larger squares or begin nearer to it; check tool and work number of the controller (0)")
 }
 

@@ -1,4 +1,5 @@
-//! In: the records of a joint solve, a check on poses that it did not see, why it ended. Out: the verdict with its reasons.
+//! In: the records of a joint solve, a check on poses that it did not see, why it ended. Out: the verdict with its
+//! reasons.
 //! Frame and unit: mm.
 
 use super::super::joint::run::JointResult;

@@ -1,5 +1,5 @@
-//! In: recordings. Out: the stops that they show: a board in room light, which laser pictures belong to it, where the robot
-//! stood; pictures that come twice count once.
+//! In: recordings. Out: the stops that they show: a board in room light, which laser pictures belong to it, where the
+//! robot stood; pictures that come twice count once.
 //! Frame and unit: px; base_from_flange in mm.
 
 use crate::calibrate::boards::{BoardView, FindOptions, find};
@@ -95,8 +95,8 @@ fn same_size(recordings: &[Recording]) -> Result<()> {
     }
 }
 
-/// Finds the boards of all recordings. `poses` names the pose file of those that have several. A stop of two recordings (the
-/// same picture in room light) has the laser pictures of both.
+/// Finds the boards of all recordings. `poses` names the pose file of those that have several. A stop of two
+/// recordings (the same picture in room light) has the laser pictures of both.
 pub fn gather(
     recordings: &[Recording],
     poses: Option<&str>,

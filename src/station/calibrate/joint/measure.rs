@@ -1,5 +1,5 @@
-//! In: stops, a camera that is roughly right. Out: stops as the joint solve takes them, and what separate calibrations of the
-//! same pictures come to.
+//! In: stops, a camera that is roughly right. Out: stops as the joint solve takes them, and what separate
+//! calibrations of the same pictures come to.
 //! Frame and unit: mm, px.
 
 use super::super::board_views::FrameBoard;
@@ -92,8 +92,8 @@ impl Measured {
 /// Measures boards, stripes and spots of all stops.
 ///
 /// # Errors
-/// Pictures that cannot be read; poses that do not belong to the pictures of their board; a stripe or a spot that no sheet or
-/// beam explains.
+/// Pictures that cannot be read; poses that do not belong to the pictures of their board; a stripe or a spot that no
+/// sheet or beam explains.
 pub fn measure(gathered: &Gathered, how: &Finders<'_>) -> Result<Measured> {
     let mut left_out = Vec::new();
     let mut boards: Vec<Placed<'_>> = Vec::new();
@@ -232,8 +232,8 @@ fn spots(boards: &[Placed<'_>], how: &Finders<'_>, out: &mut Measured) -> Result
     Ok(())
 }
 
-/// Stops whose poses, stripes and spots nothing has been compared with yet: the joint solve does that. A stop whose board has
-/// no pose is refused; stripes that tell no sheet are none.
+/// Stops whose poses, stripes and spots nothing has been compared with yet: the joint solve does that. A stop whose
+/// board has no pose is refused; stripes that tell no sheet are none.
 pub fn unjudged(stops: &[&Stop], how: &Finders<'_>) -> Result<Vec<Shot>> {
     let mut boards: Vec<Placed<'_>> = Vec::new();
     for stop in stops {

@@ -160,11 +160,12 @@ pub(in crate::station) fn first_camera(
     Ok(FirstCamera { value: found.intrinsics, covariance: CameraCovariance::new(covariance)?, free, prior: None })
 }
 
-/// Solves for everything that the recordings show, in any order, as many as there are. `progress` is told (pictures done,
-/// pictures in all).
+/// Solves for everything that the recordings show, in any order, as many as there are. `progress` is told (pictures
+/// done, pictures in all).
 ///
 /// # Errors
-/// Recordings of two cameras; no board in any picture; poses that do not belong to the pictures; what is not determined.
+/// Recordings of two cameras; no board in any picture; poses that do not belong to the pictures; what is not
+/// determined.
 pub fn calibrate_joint(
     recordings: &[Recording],
     rig: &Rig,
@@ -320,8 +321,8 @@ fn contents(rig: &Rig) -> BTreeMap<Kind, String> {
     of
 }
 
-/// Stores all records, their covariance together (`joint.json`, of no meaning for other records) and the page (`joint.html`), all of
-/// them or none.
+/// Stores all records, their covariance together (`joint.json`, of no meaning for other records) and the page
+/// (`joint.html`), all of them or none.
 pub fn store_joint(station: &Path, result: &JointResult) -> Result<Vec<Kind>> {
     store_set(station, &result.rig, &result.together, result.page.html())
 }

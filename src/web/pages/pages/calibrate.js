@@ -64,7 +64,7 @@ export async function show(place, query) {
     fill(pictures, h("p", { class: "small quiet" }, t("Press a picture to leave it out, then calibrate again.")),
       h("div", { class: "thumbs" }, Array.from({ length: r.frames }, (_, i) => {
         const [, v] = residual[i] ?? [];
-        return h("button", { class: `thumb ${out.has(i) ? "out" : ""}`, "aria-pressed": String(out.has(i)), "aria-label": `${t("Leave out")} ${i}`, onclick: () => { out.has(i) ? out.delete(i) : out.add(i); thumbs(); } },
+        return h("button", { class: `thumb ${out.has(i) ? "out" : ""}`, "aria-pressed": String(out.has(i)), "aria-label": `${t("Exclude")} ${i}`, onclick: () => { out.has(i) ? out.delete(i) : out.add(i); thumbs(); } },
           h("img", { src: picture(r.name, i, 200, r.beam ? undefined : "ambient"), alt: "", loading: "lazy" }),
           h("span", { class: v !== undefined && v === worst ? "poor-ink" : "" }, v === undefined ? `${i}` : `${i} · ${num(v, 4)}`));
       })));

@@ -28,9 +28,9 @@ export async function show(place, query) {
     const all = [...rows, ...(last.outcome.recorded ?? [])].sort((a, b) => a.width - b.width || a.ms_per_shot - b.ms_per_shot);
     const kept = last.outcome.kept_up ?? [], share = (k, n) => h("span", { class: n ? "bad-ink" : "good-ink" }, `${n} (${num((100 * n) / Math.max(1, k.sent), 1)} %)`);
     fill(bench, kept.length > 0 && [h("h3", {}, `${t("Counted here, of a camera of")} ${kept[0].rate_hz} ${t("pictures a second")}`),
-      h("div", { "data-kept": String(kept.length) }, table([t("On"), `#${t("Picture")}`, `#${t("sent")}`, `#${t("measured")}`, `#${t("passed over")}`, `#${t("lost")}`, "#ms p50 / p99"],
+      h("div", { "data-kept": String(kept.length) }, table([t("On"), `#${t("Picture")}`, `#${t("sent")}`, `#${t("measured")}`, `#${t("skipped")}`, `#${t("lost")}`, "#ms p50 / p99"],
         kept.map((k) => [k.on, `${k.width}×${k.height}`, String(k.sent), String(k.measured), share(k, k.passed_over), share(k, k.lost), `${num(k.ms[0], 1)} / ${num(k.ms[1], 1)}`])))],
-      h("h3", {}, `${t("Reckoned from the time of a shot, of a camera of")} ${rate} ${t("pictures a second")}`),
+      h("h3", {}, `${t("Estimated from shot time for a camera at")} ${rate} ${t("pictures a second")}`),
       table([t("On"), `#${t("Picture")}`, `#${t("ms a shot")}`, `#${t("keeps up with")}`, `#${t("dropped")}`],
         all.map((r) => [mine.has(r.on) ? h("b", {}, `${r.on} · ${t("here")}`) : r.on, `${r.width}×${r.height}`, num(r.ms_per_shot, 2), fits(r.ms_per_shot), drops(r.ms_per_shot)])),
       h("p", { class: "small quiet" }, t("1280×960 is twice the resolution of 640×480. Other machines as they were recorded with one clean stripe.")));

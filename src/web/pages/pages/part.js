@@ -77,7 +77,7 @@ export async function show(place, query) {
   fill(tools, pins, h("span", { class: "quiet small" }, t("Teach")), teaching, h("button", { onclick: undo }, t("Undo")), h("button", { onclick: () => select(null) }, t("Move the map")));
   const turn = field(t("Turn"), { type: "number", value: "0", step: "0.5", min: "-180", max: "180", id: "turn", oninput: () => marks() }, "°");
   const title = field(t("Name"), { type: "text", value: freeName(taken), maxlength: "60" });
-  const bears = field(t("Bears"), { type: "number", value: "0.2", step: "0.05", min: "0.01" }, "mm"), turns = field("", { type: "number", value: "1", step: "0.1", min: "0.01", "aria-label": t("Bears, degrees") }, "°"), above = field(t("Approach"), { type: "number", value: "20", step: "1", min: "1" }, "mm");
+  const bears = field(t("Tolerance"), { type: "number", value: "0.2", step: "0.05", min: "0.01" }, "mm"), turns = field("", { type: "number", value: "1", step: "0.1", min: "0.01", "aria-label": t("Tolerance, degrees") }, "°"), above = field(t("Approach"), { type: "number", value: "20", step: "1", min: "1" }, "mm");
   const value = (f) => f.querySelector("input").value;
   const teach = (name_, replace) => run({ procedure: "teach", scan: scan.id, name: name_, replace, outline: part.outline, windows: part.windows, holes: holes(), angle_deg: angle(), tolerance_mm: Number(value(bears)), tolerance_deg: Number(value(turns)), approach_mm: Number(value(above)) },
     async (j) => { recipes = await get("/recipes"); name = j.outcome.recipe; sessionStorage.setItem("recipe", name); Object.assign(part, { outline: null, windows: [], holes: [], grid: null }); title.querySelector("input").value = freeName(taken); select(null); drawn(); recipeChoice(); shown(j, j.outcome.proof); });

@@ -112,7 +112,7 @@ function pose(place, job, picture) {
         panel(t("Gates"), p.gates.map(gate)),
         panel(`${t("Standard deviation")} · ${t("axes of the part")}`,
           ["x", "y", "z"].map((a, i) => sigma(a, p.sigma_mm[i], p.tolerance_mm, "mm")), ["x", "y", "z"].map((a, i) => sigma(`r${a}`, p.sigma_deg[i], p.tolerance_deg, "°")),
-          h("p", { class: "small quiet" }, `${t("mark: a third of what the insertion bears")} (${num(p.tolerance_mm, 3, "mm")}, ${num(p.tolerance_deg, 2, "°")})`)))),
+          h("p", { class: "small quiet" }, `${t("mark: a third of the insertion's tolerance")} (${num(p.tolerance_mm, 3, "mm")}, ${num(p.tolerance_deg, 2, "°")})`)))),
     panel(t("Where it comes from"), table([t("Source"), "#σ x mm", "#σ y mm", "#σ z mm", "#σ rx °", "#σ ry °", "#σ rz °", t("What it is")],
       p.terms.map((x) => [t(x.name), ...[0, 1, 2].map((i) => num(x.sigma_mm?.[i], 4)), ...[0, 1, 2].map((i) => num(x.sigma_deg?.[i], 4)), h("span", { class: "small quiet" }, x.note)])),
       !p.complete && h("p", { class: "note small" }, t("A term is not known: the sum is a lower bound."))),

@@ -23,7 +23,7 @@ export async function show(place) {
     const act = (j, what) => attempt(async () => { if (!operating()) await operate(false); what === "remove" ? await remove(`/jobs/${j.id}`) : await post(`/jobs/${j.id}/${what}`); }, problem);
     fill(list, h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["Job", "From", "State", "Result", "s", ""].map((x) => h("th", { scope: "col" }, t(x))))),
       h("tbody", {}, all.slice(0, 60).map((j) => h("tr", {}, h("td", {}, h("a", { href: `#/${pageOf(j)}?job=${j.id}` }, j.id)), h("td", {}, source(j)), h("td", { class: { done: "good-ink", failed: "bad-ink", cut_off: "poor-ink" }[j.state] ?? "" }, t(j.state)), h("td", {}, result(j)), h("td", { class: "num" }, num(j.seconds, 1)),
-        h("td", {}, h("div", { class: "tools" }, ["cut_off", "stopped"].includes(j.state) && h("button", { class: "plain", onclick: () => act(j, "resume") }, t("Resume")), !["running", "queued"].includes(j.state) && h("button", { class: "plain", "aria-label": `${t("Take away")} ${j.id}`, onclick: () => act(j, "remove") }, "×")))))))));
+        h("td", {}, h("div", { class: "tools" }, ["cut_off", "stopped"].includes(j.state) && h("button", { class: "plain", onclick: () => act(j, "resume") }, t("Resume")), !["running", "queued"].includes(j.state) && h("button", { class: "plain", "aria-label": `${t("Delete")} ${j.id}`, onclick: () => act(j, "remove") }, "×")))))))));
   };
 
   const settings = Object.entries(info.extraction);

@@ -59,7 +59,7 @@ function backups(place, now, change) {
   const list = h("div");
   const draw = () => fill(list, now.backups.slice(0, 8).map((b) => h("div", { class: "light" }, h("span", {}, ""),
     h("span", {}, h("a", { href: url(`/backups/${encodeURIComponent(b.name)}`), download: b.name }, b.name), h("div", { class: "small quiet" }, `${b.files} ${t("files")}, ${num(b.bytes / 1e3, 0, "kB")}`)),
-    h("button", { class: "plain restore", onclick: () => { if (sure === b.name) return change(() => post(`/backups/${encodeURIComponent(b.name)}/restore`), t("Restored; the former state is a backup too.")); sure = b.name; draw(); } }, t(sure === b.name ? "Really restore?" : "Restore")))));
+    h("button", { class: "plain restore", onclick: () => { if (sure === b.name) return change(() => post(`/backups/${encodeURIComponent(b.name)}/restore`), t("Restored; the previous state is a backup too.")); sure = b.name; draw(); } }, t(sure === b.name ? "Really restore?" : "Restore")))));
   fill(place, h("p", { class: "small quiet" }, t("Settings, calibrations, recipes and boards in one file; jobs stay where they are. Each change makes one before it.")),
     h("div", { class: "row" }, h("button", { id: "backup", onclick: () => change(() => post("/backups"), t("Backed up.")) }, t("Back up now")), h("a", { href: url("/support"), download: "sheetlight-support.json" }, t("Support file (no pictures)"))), list);
   draw();
@@ -79,7 +79,7 @@ function tryOutputs(place) {
     if (state === before) return;
     before = state;
     fill(buttons, Object.entries(OUTPUTS).map(([name, words]) => h("button", { "data-output": name, disabled: !store.motion?.armed || !!store.bar?.running,
-      onclick: () => { if (name === "open" && !sure) { sure = true; return draw(); } sure = false; draw(); act(name); } }, t(name === "open" && sure ? "What it holds falls: open?" : words))));
+      onclick: () => { if (name === "open" && !sure) { sure = true; return draw(); } sure = false; draw(); act(name); } }, t(name === "open" && sure ? "The part will drop. Open the gripper?" : words))));
   };
   fill(place, armed, buttons, h("p", { class: "small quiet" }, t("Lasers and lamp for a second and a half; look away from the lasers. Nothing moves but the gripper.")), said);
   draw();

@@ -28,7 +28,7 @@ export async function show(place, query) {
     h("div", { class: "split" },
       h("section", { class: "panel fill stack" }, tools, picture, solid, line),
       h("div", { class: "stack" }, panel(t("Measured"), said), panel(t("Filters"), sieve), panel(t("Figures"), scanFigures(job.outcome)),
-        panel(t("Take away"), h("div", { class: "row" }, FILES.map(([f, n]) => h("a", { href: url(`/jobs/${job.id}/files/${f}`), download: `${job.id}-${f.split("/")[1]}` }, n)))))));
+        panel(t("Download"), h("div", { class: "row" }, FILES.map(([f, n]) => h("a", { href: url(`/jobs/${job.id}/files/${f}`), download: `${job.id}-${f.split("/")[1]}` }, n)))))));
   const view = await scanMap(picture, job.id);
   picture.lastChild.classList.add("map");
   fill(said, h("p", { class: "quiet small" }, t("Choose a tool above the map, then drag or click.")));

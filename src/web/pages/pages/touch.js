@@ -18,7 +18,7 @@ export async function show(place, query) {
     h("div", { class: "split" }, result, panel(t("Recording of the pointer"), pick)));
   function shown(j) {
     const o = j.outcome, s = o.surface;
-    fill(result, s && square(o.square), panel(`${t("Surface")} · ${j.order.recording}`, s ? figures([withSigma(s.tilt_deg, s.tilt_sigma_deg[0], "°"), t("tilt against the base's z")], [s.normal.map((v) => num(v, 5)).join("  "), t("normal, towards the camera")], [num(s.rms_mm, 4, "mm"), t("spots off the plane, rms")], [s.centre_mm.map((v) => num(v, 2)).join("  "), t("middle of the spots, mm")]) : h("p", {}, t("The spots make no plane.")), s?.left_out && h("p", { class: "note small" }, `${s.left_out} ${t("does not lie on the plane of the others and was left out")}`)),
+    fill(result, s && square(o.square), panel(`${t("Surface")} · ${j.order.recording}`, s ? figures([withSigma(s.tilt_deg, s.tilt_sigma_deg[0], "°"), t("tilt against the base's z")], [s.normal.map((v) => num(v, 5)).join("  "), t("normal, towards the camera")], [num(s.rms_mm, 4, "mm"), t("spots off the plane, rms")], [s.centre_mm.map((v) => num(v, 2)).join("  "), t("middle of the spots, mm")]) : h("p", {}, t("The spots make no plane.")), s?.left_out && h("p", { class: "note small" }, `${s.left_out} ${t("does not lie on the plane of the others and was excluded")}`)),
       panel(t("Spots"), table([t("Picture"), `#${t("Distance along the camera's axis, mm")}`, "#σ mm"], o.spots.map(([n, d, e]) => [n, num(d, 3), num(e, 4)])), o.missing.map(([n, why]) => h("p", { class: "note small" }, `${n}: ${why}`)), o.remarks.map((r) => h("p", { class: "note small" }, r))));
   }
   /** Where the robot goes to stand square: numbers for its pendant, as it writes them. */

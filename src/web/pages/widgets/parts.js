@@ -113,6 +113,6 @@ export function scanFigures(f) {
     f.coverage !== null && [num(100 * f.coverage, 1, "%"), t("of the cells measured")],
     f.cell_mm !== null && [num(f.cell_mm, 3, "mm"), t("cell")],
     [String(f.dark_shots), t("shots without a stripe"), f.dark_shots ? "poor-ink" : ""],
-    f.skipped.length && [String(f.skipped.length), t("shots left out"), "poor-ink"],
+    f.skipped.length && [String(f.skipped.length), t("excluded shots"), "poor-ink"],
     [num(f.shots_per_second, 0), t("shots a second")]);
 }

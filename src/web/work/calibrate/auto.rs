@@ -1,5 +1,5 @@
-//! In: a board below an armed robot. Out: the whole rig by moves that the program chooses, each shown at the screen and confirmed; kept
-//! until it is accepted.
+//! In: a board below an armed robot. Out: the whole rig by moves that the program chooses, each shown at the screen
+//! and confirmed; kept until it is accepted.
 //! Frame and unit: mm.
 
 use super::super::place::Place;
@@ -33,7 +33,7 @@ pub fn boards(place: &Place) -> Result<Vec<String>> {
 
 fn board(place: &Place, name: &str) -> Result<BoardSpec> {
     if !boards(place)?.iter().any(|b| b == name) {
-        return Err(Fault::input(format!("{name:?}: is no board of this station"))
+        return Err(Fault::input(format!("{name:?}: is not a board of this station"))
             .cause("its folder boards has no such description")
             .next("write one with sheetlight board, and put its .json into STATION/boards"));
     }

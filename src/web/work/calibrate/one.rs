@@ -1,5 +1,5 @@
-//! In: a recording of boards, frames to leave out. Out: a calibration with its figures beside the station's present one; stored
-//! in the station when it is accepted.
+//! In: a recording of boards, frames to leave out. Out: a calibration with its figures beside the station's present
+//! one; stored in the station when it is accepted.
 //! Frame and unit: as the calibrations; px, mm, degrees.
 
 use super::super::jobs::Jobs;
@@ -90,7 +90,7 @@ fn without(mut recording: Recording, leave_out: &[usize]) -> Result<Recording> {
     let all = recording.meta.frames.len();
     if let Some(strange) = leave_out.iter().find(|i| **i >= all) {
         return Err(
-            Fault::usage(format!("frame {strange} is to be left out, there are {all}")).next("choose one of them")
+            Fault::usage(format!("frame {strange} shall be excluded, but there are {all}")).next("choose one of them")
         );
     }
     for (i, frame) in recording.meta.frames.iter_mut().enumerate() {
@@ -134,13 +134,14 @@ fn former(station: &Path, kind: Kind) -> BTreeMap<String, f64> {
     told.map(|t| t.quality.figures).unwrap_or_default()
 }
 
-/// Stores a finished calibration in the station. Errors: another job, a verdict that is not good enough, accepted before.
+/// Stores a finished calibration in the station. Errors: another job, a verdict that is not good enough, accepted
+/// before.
 pub fn accept(jobs: &Jobs, job: &Job) -> Result<Job> {
     let refuse = |what: String| Err(Fault::usage(what).next("calibrate again"));
     let target = match (&job.order, job.state) {
         (Order::Calibrate(ask), JobState::Done) => Some(ask.target),
         (Order::Joint(_) | Order::Auto(_), JobState::Done) => None,
-        _ => return refuse(format!("{}: is no finished calibration", job.id)),
+        _ => return refuse(format!("{}: is not a finished calibration", job.id)),
     };
     let mut job = job.clone();
     let standing = match &mut job.outcome {

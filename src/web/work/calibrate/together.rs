@@ -1,4 +1,5 @@
-//! In: recordings of boards. Out: the whole rig from one solve beside the station's present one; stored together when it is accepted.
+//! In: recordings of boards. Out: the whole rig from one solve beside the station's present one; stored together when
+//! it is accepted.
 //! Frame and unit: mm, degrees.
 
 use super::super::run::Run;

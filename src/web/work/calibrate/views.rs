@@ -1,5 +1,5 @@
-//! In: a calibration that drives itself, while it runs or afterwards; a recording of boards. Out: its pictures with the corners that were found
-//! and how the board leans.
+//! In: a calibration that drives itself, while it runs or afterwards; a recording of boards. Out: its pictures with
+//! the corners that were found and how the board leans.
 //! Frame and unit: px of the picture, degrees.
 
 use super::super::jobs::Jobs;

@@ -1,5 +1,6 @@
-//! In: a folder with pictures and poses that this program reads by itself, as it would take them from its own camera and robot,
-//! and a station. Out: the height of the highest place in each profile as soon as it is there, CSV on stdout.
+//! In: a folder with pictures and poses that this program reads by itself, as it would take them from its own camera
+//! and robot, and a station. Out: the height of the highest place in each profile as soon as it is there, CSV on
+//! stdout.
 //! Frame and unit: robot's base, mm.
 //!
 //!   outside RECORDING STATION

@@ -16,8 +16,8 @@ export function drawing(problem, taken, made) {
   let text = null, unit = "", file = "part";
   const said = h("div"), form = h("div", { class: "stack", hidden: true });
   const name = field(t("Name"), { type: "text", value: "part", maxlength: "60", id: "drawing-name" });
-  const alike = field(t("Looks alike after so many turns"), { type: "number", value: "1", min: "1", step: "1" }), cell = field(t("Cell"), { type: "number", value: "0.5", min: "0.01", step: "0.05" }, "mm");
-  const bears = field(t("Bears"), { type: "number", value: "0.2", step: "0.05", min: "0.01" }, "mm"), turns = field(t("Bears, degrees"), { type: "number", value: "1", step: "0.1", min: "0.01" }, "°"), above = field(t("Approach"), { type: "number", value: "20", step: "1", min: "1" }, "mm");
+  const alike = field(t("Number of turns that look alike"), { type: "number", value: "1", min: "1", step: "1" }), cell = field(t("Cell"), { type: "number", value: "0.5", min: "0.01", step: "0.05" }, "mm");
+  const bears = field(t("Tolerance"), { type: "number", value: "0.2", step: "0.05", min: "0.01" }, "mm"), turns = field(t("Tolerance, degrees"), { type: "number", value: "1", step: "0.1", min: "0.01" }, "°"), above = field(t("Approach"), { type: "number", value: "20", step: "1", min: "1" }, "mm");
   const value = (f) => f.querySelector("input").value;
   const take = async (chosen) => {
     if (!chosen) return;

@@ -34,7 +34,7 @@ export async function filters(place, id, head, { changed, saved, problem }) {
   const of = (label) => Number(label.querySelector("input").value);
   const sigma = number("σ ≤", Number(head.sigma_mm[1].toPrecision(2)), 0.005), low = number(t("from"), num(head.z_mm[0], 1), 0.1), high = number(t("to"), num(head.z_mm[1], 1), 0.1);
   const cells = number(t("fewer cells than"), 20, 1), step = number(t("step"), num(Math.max(2 * head.cell_mm, 0.1), 2), 0.05);
-  const button = (name, f) => h("button", { class: "plain", "data-filter": name, "aria-label": `${t("Take away")}: ${t({ sigma: "Uncertain", heights: "Heights", islands: "Islands" }[name])}`, onclick: () => add(f()) }, t("Take away"));
+  const button = (name, f) => h("button", { class: "plain", "data-filter": name, "aria-label": `${t("Remove")}: ${t({ sigma: "Uncertain", heights: "Heights", islands: "Islands" }[name])}`, onclick: () => add(f()) }, t("Remove"));
   const undo = h("button", { id: "undo-filter", onclick: () => set(now.filters.slice(0, -1)) }, t("Undo"));
   const save = h("button", { id: "save-filtered", onclick: () => attempt(async () => { const j = await order({ procedure: "filter", scan: id, filters: now.filters }); follows(); follows = follow(progress, j.id, saved); }, problem) }, t("Save as a scan"));
   function draw() {

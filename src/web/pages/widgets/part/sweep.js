@@ -93,8 +93,8 @@ function numbers(p) {
     h("h3", {}, t("Speed against step, of a scan that does not stop for its pictures")),
     q ? [figures([num(q.speed_mm_s, 1, "mm/s"), t("speed")], [num(q.step_mm, 3, "mm"), t("a shot")], [num(q.rate_hz, 1), t("pictures a second")], [num(q.seconds, 1, "s"), t("in all")]),
       h("p", { class: q.left_step_mm > 1.000001 * q.step_mm ? "bad-ink" : "", "data-limit": q.limited_by ?? "" }, q.limited_by ? `${t("No more than this allows")}: ${t(LIMITS[q.limited_by])}` : t("Nothing that is known limits it.")),
-      q.left_step_mm > 1.000001 * q.step_mm && h("p", { class: "bad-ink" }, `${t("At this speed are left")}: ${num(q.left_step_mm, 3, "mm")} ${t("a shot")}`),
-      rows.length > 0 && table([t("Limit"), `#${t("pictures a second")}`, `#${t("bears, mm/s")}`], rows)]
+      q.left_step_mm > 1.000001 * q.step_mm && h("p", { class: "bad-ink" }, `${t("Actual spacing at this speed")}: ${num(q.left_step_mm, 3, "mm")} ${t("a shot")}`),
+      rows.length > 0 && table([t("Limit"), `#${t("pictures a second")}`, `#${t("allows, mm/s")}`], rows)]
       : h("p", { class: "small quiet" }, t("What limits the speed is not known: state the camera's pictures a second, or scan once.")),
   ];
 }

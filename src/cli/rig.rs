@@ -1,0 +1,84 @@
+//! The calculator of the hardware guide: prints what a planned rig will resolve.
+
+use super::terminal::arguments::parse;
+use super::terminal::console::Console;
+use crate::fault::Result;
+use crate::rig::{RigForecast, RigPlan};
+
+#[derive(clap::Subcommand)]
+pub enum Command {
+    Plan(Args),
+}
+
+/// Compute resolution, depth range and error of a planned rig
+///
+/// The camera looks squarely at the parts, and the laser sheet crosses its axis at the working distance.
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight rig plan 640x480 --pixel-um 8.3 --focal-mm 5.08 --distance-mm 155 --angle-deg 28
+Guide: docs/hardware.md")]
+pub struct Args {
+    /// Picture size: pixels along the stripe x pixels across it
+    #[arg(value_parser = parse::<Pixels>)]
+    pixels: Pixels,
+    /// Edge of a pixel, µm
+    #[arg(long, value_name = "UM")]
+    pixel_um: f64,
+    /// Focal length of the lens, mm
+    #[arg(long, value_name = "MM")]
+    focal_mm: f64,
+    /// Distance from the lens to the parts, mm
+    #[arg(long, value_name = "MM")]
+    distance_mm: f64,
+    /// Angle between the camera's axis and the laser sheet, degrees
+    #[arg(long, value_name = "DEG")]
+    angle_deg: f64,
+    /// f-number of the lens
+    #[arg(long, value_name = "N", default_value_t = 8.0)]
+    f_number: f64,
+}
+
+/// COLUMNSxROWS.
+#[derive(Clone, Copy)]
+struct Pixels([u32; 2]);
+
+impl std::str::FromStr for Pixels {
+    type Err = String;
+    fn from_str(s: &str) -> std::result::Result<Pixels, String> {
+        let parsed = s.split_once('x').and_then(|(a, b)| Some([a.parse().ok()?, b.parse().ok()?]));
+        let sound = parsed.filter(|size: &[u32; 2]| size.iter().all(|n| (16..=65_535).contains(n)));
+        sound.map(Pixels).ok_or_else(|| format!("'{s}' is not a picture size: write 640x480, each 16 to 65535"))
+    }
+}
+
+pub fn run(command: &Command, console: &Console) -> Result<()> {
+    let Command::Plan(a) = command;
+    let plan = RigPlan {
+        pixels: a.pixels.0,
+        pixel_um: a.pixel_um,
+        focal_mm: a.focal_mm,
+        distance_mm: a.distance_mm,
+        angle_deg: a.angle_deg,
+        f_number: a.f_number,
+    };
+    let forecast = plan.forecast()?;
+    console.result(&forecast, &text(&forecast));
+    Ok(())
+}
+
+fn text(f: &RigForecast) -> String {
+    let range = |(near, far): (f64, Option<f64>)| match far {
+        Some(far) => format!("{near:.1} to {far:.1} mm"),
+        None => format!("from {near:.1} mm on"),
+    };
+    [
+        format!("a pixel sees        {:.4} mm", f.pixel_mm),
+        format!("the picture sees    {:.1} x {:.1} mm", f.view_mm[0], f.view_mm[1]),
+        format!("depth per pixel     {:.4} mm", f.depth_per_pixel_mm),
+        format!("scatter of a point  {:.4} to {:.4} mm (1 sigma, clean stripe)", f.scatter_mm[0], f.scatter_mm[1]),
+        format!("stripe in view      {}", range(f.stripe_mm)),
+        format!("sharp to a pixel    {}", range(f.sharp_mm)),
+        format!("shadow              {:.2} mm behind a step of 1 mm", f.shadow_mm),
+    ]
+    .join("\n")
+}

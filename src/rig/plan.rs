@@ -1,0 +1,147 @@
+//! What a planned rig will resolve, from the data sheets of camera, lens and laser (docs/hardware.md). Lengths in mm.
+
+use crate::fault::{Fault, Result};
+
+/// A camera that looks squarely at the parts, and a laser sheet that crosses its axis at the working distance.
+#[derive(Clone, Copy, Debug)]
+pub struct RigPlan {
+    /// Picture, px; the first number is along the stripe.
+    pub pixels: [u32; 2],
+    /// Edge of a pixel, µm.
+    pub pixel_um: f64,
+    /// Focal length, mm.
+    pub focal_mm: f64,
+    /// From the projection centre to the parts, mm.
+    pub distance_mm: f64,
+    /// Between the camera's axis and the laser sheet, degrees.
+    pub angle_deg: f64,
+    /// f-number of the lens.
+    pub f_number: f64,
+}
+
+/// What a [`RigPlan`] resolves.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct RigForecast {
+    /// Width of the parts that a pixel sees, mm.
+    pub pixel_mm: f64,
+    /// What the picture sees at the working distance, mm.
+    pub view_mm: [f64; 2],
+    /// Change of depth that moves the stripe by a pixel, for a surface square to the camera, mm.
+    pub depth_per_pixel_mm: f64,
+    /// Scatter of a point on a clean stripe, mm: from a centre found to 0.02 px to one found to 0.05 px.
+    pub scatter_mm: [f64; 2],
+    /// Nearest and farthest distance at which the stripe is in the picture, mm; `None`: however far.
+    pub stripe_mm: (f64, Option<f64>),
+    /// Nearest and farthest distance at which a point is blurred by less than a pixel, mm; `None`: however far.
+    pub sharp_mm: (f64, Option<f64>),
+    /// What stays dark behind a step of 1 mm, mm.
+    pub shadow_mm: f64,
+}
+
+impl RigPlan {
+    /// # Errors
+    /// A value that no camera, lens or laser has.
+    pub fn forecast(&self) -> Result<RigForecast> {
+        let limits = [
+            ("pixel_um", self.pixel_um, 0.5, 50.0),
+            ("focal_mm", self.focal_mm, 0.5, 2000.0),
+            ("distance_mm", self.distance_mm, 1.0, 20_000.0),
+            ("angle_deg", self.angle_deg, 3.0, 80.0),
+            ("f_number", self.f_number, 0.5, 64.0),
+        ];
+        for (name, value, least, most) in limits {
+            if !(least..=most).contains(&value) {
+                return Err(Fault::usage(format!("{name} is {value}; allowed: {least} to {most}"))
+                    .cause("another unit, or a slipped decimal point")
+                    .next("take the value from the data sheet"));
+            }
+        }
+        if self.distance_mm <= self.focal_mm {
+            return Err(Fault::usage(format!("distance_mm is {} and focal_mm {}", self.distance_mm, self.focal_mm))
+                .cause("a lens forms no picture of what is closer than its focal length")
+                .next("take the distance from the lens to the parts"));
+        }
+        let edge = self.pixel_um / 1000.0;
+        let (z, f) = (self.distance_mm, self.focal_mm);
+        let pixel_mm = z * edge / f;
+        let tan = self.angle_deg.to_radians().tan();
+        let depth_per_pixel_mm = pixel_mm / tan;
+        // The stripe leaves the picture at half its height: |z - Z| tan t = z h a / 2f.
+        let half = 0.5 * f64::from(self.pixels[1]) * edge / f;
+        let far = |d: f64, near: f64| (d > 0.0).then(|| near / d);
+        let stripe_mm = (z * tan / (tan + half), far(tan - half, z * tan));
+        // A circle of confusion of one pixel: Z f² / (f² ± N a (Z - f)).
+        let blur = self.f_number * edge * (z - f);
+        let sharp_mm = (z * f * f / (f * f + blur), far(f * f - blur, z * f * f));
+        Ok(RigForecast {
+            pixel_mm,
+            view_mm: self.pixels.map(|n| f64::from(n) * pixel_mm),
+            depth_per_pixel_mm,
+            scatter_mm: [0.02, 0.05].map(|px| px * depth_per_pixel_mm),
+            stripe_mm,
+            sharp_mm,
+            shadow_mm: tan,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GUIDE: RigPlan = RigPlan {
+        pixels: [640, 480],
+        pixel_um: 8.3,
+        focal_mm: 5.08,
+        distance_mm: 155.0,
+        angle_deg: 28.0,
+        f_number: 8.0,
+    };
+
+    /// Where a point of the sheet at depth z appears, px from the picture's middle, by the ray and the plane
+    /// themselves.
+    fn row(plan: &RigPlan, z: f64) -> f64 {
+        let aside = (plan.distance_mm - z) * plan.angle_deg.to_radians().tan();
+        aside / z * plan.focal_mm / (plan.pixel_um / 1000.0)
+    }
+
+    #[test]
+    fn the_forecast_is_what_ray_and_plane_give() {
+        let found = GUIDE.forecast().unwrap();
+        assert!((found.pixel_mm - 0.253).abs() < 5e-4 && (found.view_mm[0] - 162.1).abs() < 0.1, "{found:?}");
+        // A small step of the surface moves the stripe by as much as stated.
+        let step = 1e-3;
+        let moved = row(&GUIDE, GUIDE.distance_mm - step) - row(&GUIDE, GUIDE.distance_mm);
+        assert!((step / moved - found.depth_per_pixel_mm).abs() < 1e-4, "{found:?}");
+        // At the ends of the range the stripe is at the picture's border.
+        let (near, far) = (found.stripe_mm.0, found.stripe_mm.1.unwrap());
+        assert!((row(&GUIDE, near) - 240.0).abs() < 1e-6 && (row(&GUIDE, far) + 240.0).abs() < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn a_point_at_the_end_of_the_sharp_range_is_blurred_by_a_pixel() {
+        let plan = RigPlan { focal_mm: 50.0, distance_mm: 400.0, f_number: 4.0, ..GUIDE };
+        let found = plan.forecast().unwrap();
+        for z in [found.sharp_mm.0, found.sharp_mm.1.unwrap()] {
+            // Thin lens: the picture of depth z lies at v, the sensor at v0; the aperture f / N makes a cone.
+            let image = |z: f64| 1.0 / (1.0 / plan.focal_mm - 1.0 / z);
+            let (v, v0) = (image(z), image(plan.distance_mm));
+            let blur = plan.focal_mm / plan.f_number * (v - v0).abs() / v;
+            assert!((blur - 0.0083).abs() < 1e-6, "{z}: {blur}");
+        }
+    }
+
+    #[test]
+    fn a_stripe_or_a_lens_may_reach_however_far() {
+        let flat = RigPlan { angle_deg: 10.0, distance_mm: 1000.0, ..GUIDE }.forecast().unwrap();
+        assert!(flat.stripe_mm.1.is_none() && flat.sharp_mm.1.is_none(), "{flat:?}");
+    }
+
+    #[test]
+    fn what_no_data_sheet_has_is_refused_with_the_limit() {
+        let refused = |plan: RigPlan| plan.forecast().unwrap_err().to_string();
+        assert!(refused(RigPlan { angle_deg: 90.0, ..GUIDE }).contains("angle_deg is 90; allowed: 3 to 80"));
+        assert!(refused(RigPlan { pixel_um: f64::NAN, ..GUIDE }).contains("pixel_um is NaN"));
+        assert!(refused(RigPlan { focal_mm: 200.0, ..GUIDE }).contains("focal_mm 200"));
+    }
+}
