@@ -15,6 +15,7 @@ mod hand_eye_judge;
 mod joint;
 mod laser_plane_judge;
 mod legacy_charuco;
+mod notations;
 mod photographs;
 mod pointer_judge;
 mod second_look;
