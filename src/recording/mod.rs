@@ -192,7 +192,7 @@ impl Recording {
         if name.is_none() && self.meta.pose_file.is_none() {
             let poses = self.carried();
             if !poses.is_empty() {
-                return Ok(PoseFile { poses, warnings: Vec::new() });
+                return Ok(PoseFile::of(poses));
             }
         }
         let name = match (name, &self.meta.pose_file) {

@@ -4,7 +4,7 @@
 use super::pose_csv::Row;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, ORTHONORMAL_WARN, Rigid};
-use crate::robot::Convention;
+use crate::robot::{Convention, Written};
 use std::path::{Path, PathBuf};
 
 /// The poses of a file, and what a person should know about them.
@@ -12,6 +12,8 @@ use std::path::{Path, PathBuf};
 pub struct PoseFile {
     /// base_from_flange, mm, in the file's order.
     pub poses: Vec<Rigid<Base, Flange>>,
+    /// The numbers that each pose was read from.
+    pub written: Vec<Written>,
     /// Repairs above the warning limit, in words.
     pub warnings: Vec<String>,
 }
@@ -100,7 +102,7 @@ pub fn load_poses(path: &Path) -> Result<PoseFile> {
 }
 
 fn collect(rows: Vec<Row>) -> Result<PoseFile> {
-    let mut out = PoseFile { poses: Vec::new(), warnings: Vec::new() };
+    let mut out = PoseFile { poses: Vec::new(), written: Vec::new(), warnings: Vec::new() };
     for (expected, (index, convention, numbers)) in rows.into_iter().enumerate() {
         if index != expected {
             return Err(Fault::input(format!("pose {expected} is numbered {index}"))
@@ -129,13 +131,25 @@ fn collect(rows: Vec<Row>) -> Result<PoseFile> {
             .next("correct the pose, or remove its frame from meta.json"));
         }
         out.poses.push(pose);
+        out.written.push(Written { convention, numbers: without_figure(convention, numbers) });
     }
     let metres = out.metres();
     out.warnings.extend(metres);
     Ok(out)
 }
 
+/// A Denso file may have the arm's figure in a last column.
+fn without_figure(convention: Convention, mut numbers: Vec<f64>) -> Vec<f64> {
+    numbers.truncate(convention.labels().len());
+    numbers
+}
+
 impl PoseFile {
+    /// Poses that came as transforms, without a file of their own.
+    pub(super) fn of(poses: Vec<Rigid<Base, Flange>>) -> PoseFile {
+        PoseFile { written: poses.iter().map(Written::matrix).collect(), poses, warnings: Vec::new() }
+    }
+
     /// What is odd about poses that all lie in the robot's own foot.
     fn metres(&self) -> Option<String> {
         let reach = self.poses.iter().map(|p| p.translation.norm()).fold(0.0, f64::max);

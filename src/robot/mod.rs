@@ -4,6 +4,9 @@
 
 pub mod fanuc_tp;
 pub mod program;
+mod written;
+
+pub use written::Written;
 
 use crate::fault::{Fault, Result};
 use crate::geometry::{Frame, Mat3, Rigid, Vec3, exp, log, repair};

@@ -67,5 +67,5 @@ pub use scan::scan_folder::of_a_scan;
 pub use scan::seen::Seen;
 pub use scan::watch::Watch;
 pub use settings::{HeadSpec, Settings, ToolSpec, WorkingVolume};
-pub use values::{PlaneValue, Sigmas, Values};
+pub use values::{PlaneValue, Sigmas, Values, ValuesFormat, written_camera};
 pub use verify::{CalibrationCheck, VerifyReport, VerifyRun, verify};

@@ -9,7 +9,7 @@ use rand::{Rng, SeedableRng, seq::SliceRandom};
 use rand_pcg::Pcg64;
 use sheetlight::calibrate::boards::Turn;
 use sheetlight::calibrate::boards::turns;
-use sheetlight::calibrate::hand_eye::checks::chance;
+use sheetlight::calibrate::hand_eye::chance::chance;
 use sheetlight::calibrate::hand_eye::closed::{Chain, Far, Near, Pair};
 use sheetlight::calibrate::hand_eye::expected::expected_error;
 use sheetlight::calibrate::hand_eye::fit::HandEyeFit;
@@ -263,7 +263,7 @@ const NOISY: Noise = Noise { mm: 2.0, deg: 1.0, px: 0.1 };
 /// The same pairs without their pixels: what another program would hand over, its sigmas stated or not.
 fn poses_alone(pairs: &[Pair], sigma: Option<[f64; 2]>) -> Vec<Pair> {
     let given = |p: &Pair| MeasuredPose::given(p.seen.name.clone(), p.seen.camera_from_board, sigma, 100.0);
-    pairs.iter().map(|p| Pair { near_from_far: p.near_from_far, seen: given(p) }).collect()
+    pairs.iter().map(|p| Pair::new(p.near_from_far, given(p))).collect()
 }
 
 /// rms of error over stated sigma, of the camera's six numbers, over many sets; solved as `solved` says.
@@ -461,9 +461,8 @@ fn wrong_input_is_refused_with_its_name() {
         let rng = &mut Pcg64::seed_from_u64(80 + seed);
         let s = station(rng, Mount::EyeInHand, 12);
         let good = pairs(rng, &s, LEVELS[1], &s.camera);
-        let with_poses = |f: &dyn Fn(usize) -> Rigid<Near, Far>| -> Vec<Pair> {
-            (0..12).map(|i| Pair { near_from_far: f(i), seen: good[i].seen.clone() }).collect()
-        };
+        let with_poses =
+            |f: &dyn Fn(usize) -> Rigid<Near, Far>| -> Vec<Pair> { (0..12).map(|i| good[i].at(f(i))).collect() };
         refused(&s, &with_poses(&|i| good[11 - i].near_from_far), "reverse order");
         refused(&s, &with_poses(&|i| good[(i + 1) % 12].near_from_far), "1 places earlier");
         let metres = |t: &Rigid<Near, Far>| {

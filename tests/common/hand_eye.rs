@@ -98,7 +98,7 @@ pub fn pairs(rng: &mut Pcg64, s: &Station, noise: Noise, believed: &Intrinsics) 
                 pixels,
                 sigmas_px: vec![1.0; s.points.len()],
             };
-            Pair { near_from_far: read(rng, s, pose, noise), seen: measure(&seen, believed, &true_board).unwrap() }
+            Pair::new(read(rng, s, pose, noise), measure(&seen, believed, &true_board).unwrap())
         })
         .collect()
 }

@@ -6,6 +6,7 @@ mod circles;
 mod ellipse;
 pub mod extent;
 mod marker_grid;
+mod other_size;
 pub mod print;
 mod quads;
 pub mod refine;
@@ -15,5 +16,6 @@ pub mod shape;
 mod view;
 
 pub use chess::turns::{Turn, turns};
+pub use other_size::look_at_all;
 pub use search::find;
 pub use view::{BoardPoint, BoardView, FindOptions};

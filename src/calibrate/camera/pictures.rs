@@ -3,7 +3,7 @@
 //! Frame and unit: px.
 
 use super::intrinsics::Observation;
-use crate::calibrate::boards::{FindOptions, find};
+use crate::calibrate::boards::{FindOptions, find, look_at_all};
 use crate::fault::{Fault, Kind, Result};
 use crate::recording::{BoardSpec, FrameRef, Recording};
 use rayon::prelude::*;
@@ -96,18 +96,14 @@ pub(in crate::calibrate) fn pictures(
     let sources = sources(recordings);
     let all = sources.len();
     let done = std::sync::atomic::AtomicUsize::new(0);
-    type Seen = (String, Option<String>, Result<Observation>);
-    let mut seen: Vec<Seen> = sources
-        .par_iter()
-        .map(|source @ Source { recording, file, name, .. }| {
-            let seen = look(source, None, options);
-            progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, all);
-            (name.clone(), crate::rig::hash_file(&recording.folder.join(file)).ok(), seen)
-        })
-        .collect();
+    let mut seen = look_at_all(all, |i| {
+        let seen = look(&sources[i], None, options);
+        progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, all);
+        seen
+    });
     // A picture that does not tell the colour of its board's first square takes it from those that do.
-    if let Some(white) = seen.iter().find_map(|(.., o)| o.as_ref().ok()).map(|o| o.view.begins_white) {
-        sources.par_iter().zip(&mut seen).filter(|(_, (.., o))| o.is_err()).for_each(|(source, (.., o))| {
+    if let Some(white) = seen.iter().find_map(|o| o.as_ref().ok()).map(|o| o.view.begins_white) {
+        sources.par_iter().zip(&mut seen).filter(|(_, o)| o.is_err()).for_each(|(source, o)| {
             if source.first_square_may_be_open() {
                 *o = look(source, Some(white), options);
             }
@@ -116,7 +112,8 @@ pub(in crate::calibrate) fn pictures(
     let (mut pictures, mut left_out): (Vec<Observation>, Vec<(String, Fault)>) = Default::default();
     // SHA-256 to name: a picture that comes again says nothing new.
     let mut known: BTreeMap<String, String> = BTreeMap::new();
-    for (name, hash, seen) in seen {
+    for (Source { recording, file, name, .. }, seen) in sources.iter().zip(seen) {
+        let (name, hash) = (name.clone(), crate::rig::hash_file(&recording.folder.join(file)).ok());
         let first = hash.as_ref().and_then(|h| known.get(h));
         if let (Some(first), Ok(_)) = (first, &seen) {
             let again = Fault::refused(format!("it is the same picture as {first}"))
@@ -158,7 +155,13 @@ fn too_few(found: usize, all: usize, left_out: &[(String, Fault)]) -> Fault {
     let votes = |l: &(String, Fault)| left_out.iter().filter(|o| o.1.cause == l.1.cause).count();
     let first = left_out.iter().rev().max_by_key(|l| votes(l)).map(|l| l.1.clone());
     let listed: String = left_out.iter().map(|(n, f)| format!("\n    {n}: {}", f.what)).collect();
-    Fault::refused(format!("the board was found in {} of {all} pictures, 3 or more are needed{listed}", found,))
-        .cause(first.as_ref().map_or("too few pictures", |f| f.cause.as_str()))
-        .next(first.as_ref().map_or("take 10 to 20 pictures of the board", |f| f.next.as_str()))
+    let not_searched = match all - found - left_out.len() {
+        0 => String::new(),
+        n => format!("; {} agree about another board, and the other {n} were not searched", left_out.len()),
+    };
+    Fault::refused(format!(
+        "the board was found in {found} of {all} pictures, 3 or more are needed{not_searched}{listed}"
+    ))
+    .cause(first.as_ref().map_or("too few pictures", |f| f.cause.as_str()))
+    .next(first.as_ref().map_or("take 10 to 20 pictures of the board", |f| f.next.as_str()))
 }

@@ -4,6 +4,7 @@
 
 use crate::calibrate::measured_pose::MeasuredPose;
 use crate::geometry::{Board, Camera, Frame, Mat3, Rigid, Vec3, log, orthonormalise};
+use crate::robot::Written;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 
@@ -27,6 +28,19 @@ pub struct Pair {
     pub near_from_far: Rigid<Near, Far>,
     /// The board's pose as the camera measured it.
     pub seen: MeasuredPose,
+    /// The numbers that the robot's pose was read from; none of a pose that came over a wire.
+    pub written: Option<Written>,
+}
+
+impl Pair {
+    /// A pair whose robot pose is what it is, in no notation.
+    pub fn new(near_from_far: Rigid<Near, Far>, seen: MeasuredPose) -> Pair {
+        Pair { near_from_far, seen, written: None }
+    }
+    /// The same picture with another pose of the robot.
+    pub fn at(&self, near_from_far: Rigid<Near, Far>) -> Pair {
+        Pair { near_from_far, ..self.clone() }
+    }
 }
 
 /// Both unknowns of the chain camera ← near ← far ← board.

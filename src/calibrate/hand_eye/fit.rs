@@ -57,6 +57,8 @@ pub struct HandEyeFit {
     pub chi2: f64,
     /// Whether it is a minimum.
     pub end: End,
+    /// With what the pairs that were left out would fit the others, in words.
+    pub left_out_fit: Option<String>,
     /// The closed form that it started from.
     pub start: Agreement,
 }

@@ -2,12 +2,14 @@
 //! Frame and unit: see `closed`; mm, rad (docs/math.md, Hand-eye).
 
 pub mod camera_belief;
+pub mod chance;
 pub mod checks;
 pub mod closed;
 pub mod expected;
 pub mod fit;
 mod noise;
 pub mod options;
+pub mod otherwise;
 pub mod report;
 pub mod solve;
 mod terms;

@@ -4,7 +4,7 @@
 
 use super::closed::{Chain, Far, Near};
 use crate::fault::{Fault, Result};
-use crate::geometry::{Rigid, Vec3};
+use crate::geometry::{Base, Flange, Rigid, Vec3};
 
 /// Settings of [`super::solve::solve`].
 #[derive(Clone, Debug)]
@@ -107,6 +107,22 @@ impl Mount {
     /// As station.toml and the command line call it.
     pub fn name(self) -> &'static str {
         self.into()
+    }
+    /// The robot's pose as the chain needs it.
+    pub fn near_from_far(self, base_from_flange: &Rigid<Base, Flange>) -> Rigid<Near, Far> {
+        let inverse = base_from_flange.inverse();
+        match self {
+            Mount::EyeInHand => Rigid::new(inverse.rotation, inverse.translation),
+            Mount::EyeToHand => Rigid::new(base_from_flange.rotation, base_from_flange.translation),
+        }
+    }
+    /// The robot's pose of a pair.
+    pub fn base_from_flange(self, near_from_far: &Rigid<Near, Far>) -> Rigid<Base, Flange> {
+        let inverse = near_from_far.inverse();
+        match self {
+            Mount::EyeInHand => Rigid::new(inverse.rotation, inverse.translation),
+            Mount::EyeToHand => Rigid::new(near_from_far.rotation, near_from_far.translation),
+        }
     }
     /// The flange's origin in the camera frame.
     pub(in crate::calibrate) fn flange(self, chain: &Chain, near_from_far: &Rigid<Near, Far>) -> Vec3 {

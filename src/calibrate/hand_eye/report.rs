@@ -97,6 +97,7 @@ impl Evidence<'_> {
                 format!("{} was excluded: its pose and picture disagree by {:.2} mm{whose}", r.name, r.mm)
             });
         }
+        j.reasons.extend(self.fit.left_out_fit.clone());
     }
 
     /// What the robot's poses, the camera and the boards' own pictures make of the error.

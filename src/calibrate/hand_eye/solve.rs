@@ -8,6 +8,7 @@ use super::closed::{Agreement, Pair, agree, canonical_order};
 use super::fit::{HandEyeFit, PairResidual};
 use super::noise::{Fitted, fit};
 use super::options::{HandEyeOptions, Mount, Noise};
+use super::otherwise;
 use super::terms::{Refined, UNKNOWNS, refine, step_covariance, with_camera};
 use crate::calibrate::measured_pose::pooled_factor;
 use crate::camera::{CameraCovariance, Intrinsics, PARAMETERS};
@@ -69,9 +70,9 @@ pub fn solve(
     o: &HandEyeOptions,
 ) -> Result<HandEyeFit> {
     o.check()?;
-    checks::before(pairs, o)?;
+    checks::before(pairs, mount, o)?;
     let given = CameraBelief::given(camera);
-    let mispaired = || checks::explain(pairs, "pictures and robot poses do not belong together".into(), o);
+    let mispaired = || otherwise::explain(pairs, "pictures and robot poses do not belong together".into(), mount, o);
     let agreement = start(pairs, o).map_err(|_| mispaired())?;
     let seen = || pairs.iter().map(|p| &p.seen);
     let scatter = agreement.spread.max(1e-3);
@@ -103,7 +104,7 @@ pub fn solve(
     let mut to_parameters = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::identity();
     to_parameters.fixed_view_mut::<PARAMETERS, PARAMETERS>(12, 12).copy_from(&camera.belief.root);
     let joint = to_parameters * c * to_parameters.transpose();
-    let fit = HandEyeFit {
+    let mut fit = HandEyeFit {
         chain: refined.chain,
         covariance: DMatrix::from_fn(12, 12, |i, j| c[(i, j)]),
         by_camera: c.fixed_view::<12, PARAMETERS>(0, 12) * camera.by_given,
@@ -116,9 +117,10 @@ pub fn solve(
         pairs: residuals,
         chi2: refined.cost / freedom.max(1.0),
         end: refined.end,
+        left_out_fit: None,
         start: agreement,
     };
-    checks::after(pairs, &fit, o)?;
+    fit.left_out_fit = checks::after(pairs, &fit, mount, o)?;
     Ok(fit)
 }
 

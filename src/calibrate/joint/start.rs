@@ -7,7 +7,6 @@ use super::shots::{LeftOut, Part, Shot};
 use super::unknowns::State;
 use crate::calibrate::boards::{BoardPoint, BoardView};
 use crate::calibrate::hand_eye::closed::{Far, Near, Pair, agree, canonical_order};
-use crate::calibrate::hand_eye::options::Mount;
 use crate::calibrate::laser_plane::agree::majority;
 use crate::calibrate::laser_plane::options::LaserPlaneOptions;
 use crate::calibrate::laser_plane::terms::{Seen, look, on_board};
@@ -16,7 +15,7 @@ use crate::calibrate::pointer::beam::robust_line;
 use crate::calibrate::pose::pose_of_points;
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Base, Board, Camera, Flange, Plane, Ray, Rigid, Vec3, orthonormalise};
+use crate::geometry::{Board, Camera, Plane, Ray, Rigid, Vec3, orthonormalise};
 
 /// The board's pose in a picture.
 pub fn board(camera: &Intrinsics, seen: &SeenBoard) -> Result<MeasuredPose> {
@@ -25,15 +24,6 @@ pub fn board(camera: &Intrinsics, seen: &SeenBoard) -> Result<MeasuredPose> {
     let view = BoardView { points, ..BoardView::default() };
     let start = pose_of_points(camera, &seen.points, &view).map_err(|e| e.at(&seen.name))?;
     measure(seen, camera, &start.camera_from_board)
-}
-
-/// The robot's pose as hand-eye solves take it.
-pub fn near_from_far(mount: Mount, pose: &Rigid<Base, Flange>) -> Rigid<Near, Far> {
-    let (r, t) = match mount {
-        Mount::EyeInHand => (pose.inverse().rotation, pose.inverse().translation),
-        Mount::EyeToHand => (pose.rotation, pose.translation),
-    };
-    Rigid::new(r, t)
 }
 
 /// A start for all that the stops speak of; `places` is how many places of boards they name. What nothing speaks of
@@ -92,9 +82,8 @@ fn chain(
 ) -> Result<(Rigid<Near, Camera>, Vec<Rigid<Far, Board>>)> {
     let of = |place: usize| -> Vec<Pair> {
         let here = shots.iter().zip(measured).filter(|(s, _)| s.robot.is_some_and(|r| r.place == place));
-        let pair = |(s, m): (&Shot, &MeasuredPose)| Pair {
-            near_from_far: near_from_far(o.mount, &s.robot.expect("filtered").pose),
-            seen: m.clone(),
+        let pair = |(s, m): (&Shot, &MeasuredPose)| {
+            Pair::new(o.mount.near_from_far(&s.robot.expect("filtered").pose), m.clone())
         };
         let pairs: Vec<Pair> = here.map(pair).collect();
         canonical_order(&pairs).into_iter().map(|i| pairs[i].clone()).collect()

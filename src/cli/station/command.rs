@@ -12,7 +12,7 @@ use crate::fault::{Fault, Result};
 use crate::geometry::{Axis, AxisKind, Base, Camera, Plane, Ray, Rigid};
 use crate::rig::{Calibration, HandEye, Kind, Rig};
 use crate::robot::Convention;
-use crate::station::{Settings, Sigmas, Values};
+use crate::station::{Settings, Sigmas, Values, ValuesFormat, written_camera};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
@@ -21,9 +21,9 @@ pub enum Command {
     New(New),
     /// Show a station's calibrations and their uncertainty
     Show(Show),
-    /// Store known calibration values from a JSON file (docs/file-formats.md)
+    /// Store known calibration values, or another program's camera, from a file (docs/file-formats.md)
     Import(Import),
-    /// Write a station's values as one JSON file that import reads
+    /// Write a station's values as a file that import reads, or its camera for another program
     Export(Export),
     Set(keep::Set),
     Backup(keep::BackUp),
@@ -68,7 +68,7 @@ pub struct Show {
 
 #[derive(clap::Args)]
 pub struct Import {
-    /// JSON file with the values
+    /// JSON file with the values, or another program's file of a camera (docs/file-formats.md)
     values: PathBuf,
     /// Station folder; created if missing
     #[arg(long)]
@@ -134,9 +134,13 @@ pub struct Export {
     /// Station folder
     #[arg(long)]
     station: PathBuf,
-    /// File for the values (JSON)
+    /// File for the values (JSON), or for the camera alone (YAML, XML, JSON)
     #[arg(long)]
     out: PathBuf,
+    /// For whom: values (this program, all that the station has), opencv (the camera, by --out's extension .yaml, .xml or .json),
+    /// ros (camera_info) or kalibr
+    #[arg(long = "as", default_value = "values", value_parser = crate::cli::terminal::arguments::parse::<ValuesFormat>)]
+    format: ValuesFormat,
 }
 
 pub fn run(command: &Command, console: &Console) -> Result<()> {
@@ -163,8 +167,12 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
         }
         Command::Export(a) => {
             outputs::check(&[&a.out], &Inputs { station: Some(&a.station), ..Inputs::default() })?;
-            let values = Values::of(&Rig::load(&a.station)?);
-            let text = serde_json::to_string_pretty(&values).expect("plain numbers");
+            let rig = Rig::load(&a.station)?;
+            let extension = a.out.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+            let text = match a.format {
+                ValuesFormat::Values => serde_json::to_string_pretty(&Values::of(&rig)).expect("plain numbers"),
+                other => written_camera(&rig.need_camera()?.value, other, &extension)?,
+            };
             crate::files::write(&a.out, text.as_bytes())?;
             console.say(format!("{}: written", a.out.display()));
         }

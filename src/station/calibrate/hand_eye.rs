@@ -17,6 +17,7 @@ use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Board, Camera, Flange, Rigid};
 use crate::recording::{Recording, load_board_poses, load_poses};
 use crate::rig::{Calibration, HandEye, Kind, Rig, Volume, hash_file, hash_text};
+use crate::robot::Written;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -87,12 +88,13 @@ pub fn calibrate_hand_eye(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<HandEyeResult> {
     let camera = rig.need_camera()?;
-    let poses = recording.poses(run.poses.as_deref())?;
+    let file = recording.pose_file(run.poses.as_deref())?;
+    let poses: Vec<_> = file.poses.iter().zip(&file.written).collect();
     let seen = boards(recording, camera, progress)?;
     let mut pairs = Vec::new();
     for b in &seen.found {
         let pose = recording.pose_of(b.frame, &poses).map_err(|e| e.at(&b.pose.name))?;
-        pairs.push(paired(run.mount, pose, b.pose.clone()));
+        pairs.push(paired(run.mount, *pose, b.pose.clone()));
     }
     let mut notes: Vec<String> =
         seen.missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))).collect();
@@ -105,7 +107,7 @@ pub fn calibrate_hand_eye(
         ));
     }
     let pose_name = run.poses.clone().or(recording.meta.pose_file.clone()).unwrap_or_default();
-    let rows: Vec<[f64; 16]> = poses.iter().map(|p| p.to_rows()).collect();
+    let rows: Vec<[f64; 16]> = file.poses.iter().map(|p| p.to_rows()).collect();
     let mut inputs = BTreeMap::from([
         ("meta.json".to_string(), hash_file(&recording.folder.join("meta.json"))?),
         (format!("poses {pose_name}"), hash_text(serde_json::to_string(&rows).expect("numbers").as_bytes())),
@@ -121,7 +123,8 @@ pub fn calibrate_hand_eye(
 
 /// The same from robot poses and board poses that another program measured, without pictures: no camera is needed.
 pub fn calibrate_hand_eye_from_poses(files: &PosePairs, rig: &Rig, run: &HandEyeRun) -> Result<HandEyeResult> {
-    let poses = load_poses(&files.robot)?.poses;
+    let file = load_poses(&files.robot)?;
+    let poses: Vec<_> = file.poses.iter().zip(&file.written).collect();
     let boards = load_board_poses(&files.boards)?;
     // Boards are compared at the corners of a square that a usual lens sees nearly whole at their distance.
     let depths = Volume::spanned(boards.iter().map(|(_, b)| b.translation.z), "where the boards stood");
@@ -133,7 +136,7 @@ pub fn calibrate_hand_eye_from_poses(files: &PosePairs, rig: &Rig, run: &HandEye
                 .next("export the poses of all pictures again")
         })?;
         let seen = MeasuredPose::given(format!("pose {index}"), *board, files.board_sigma, side);
-        Ok(paired(run.mount, pose, seen))
+        Ok(paired(run.mount, *pose, seen))
     };
     let gathered = Gathered {
         pairs: boards.iter().map(pair).collect::<Result<_>>()?,
@@ -162,13 +165,9 @@ pub fn calibrate_hand_eye_from_poses(files: &PosePairs, rig: &Rig, run: &HandEye
     concluded(gathered, &CameraCovariance::exact(), &tangents, rig, view, run)
 }
 
-/// The pair of a board and a robot pose.
-fn paired(mount: Mount, pose: &Rigid<Base, Flange>, seen: MeasuredPose) -> Pair {
-    let (r, t) = match mount {
-        Mount::EyeInHand => (pose.inverse().rotation, pose.inverse().translation),
-        Mount::EyeToHand => (pose.rotation, pose.translation),
-    };
-    Pair { near_from_far: Rigid::new(r, t), seen }
+/// The pair of a board and a robot pose with the numbers that it was read from.
+fn paired(mount: Mount, (pose, written): (&Rigid<Base, Flange>, &Written), seen: MeasuredPose) -> Pair {
+    Pair { written: Some(written.clone()), ..Pair::new(mount.near_from_far(pose), seen) }
 }
 
 /// `view` is how wide the camera sees at a depth, mm.

@@ -35,6 +35,9 @@ pub struct Values {
     /// A turntable as a fixed camera sees it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turntable: Option<Axis>,
+    /// Whose file it was, and by which conventions it was read; none of this program's own.
+    #[serde(skip)]
+    pub read_as: Option<String>,
 }
 
 /// `normal · X = offset_mm` in the camera frame.
@@ -57,6 +60,9 @@ impl Values {
     /// Reads a JSON file.
     pub fn load(path: &Path) -> Result<Values> {
         let text = crate::files::read_text(path)?;
+        if let Some((camera, said)) = super::foreign::camera(&text).map_err(|e| e.at(path.display()))? {
+            return Ok(Values { intrinsics: Some(camera), read_as: Some(said), ..Values::default() });
+        }
         serde_json::from_str(&text).map_err(|e| {
             Fault::input(format!("{}: contains no rig values: {e}", path.display()))
                 .cause(crate::files::slip_in(&text, e.line(), "not JSON, or an entry of another shape"))
@@ -83,6 +89,7 @@ impl Values {
             base_from_camera: rig.base_camera.as_ref().map(|c| c.value.to_rows()),
             linear_axis: rig.linear_axis.as_ref().map(|c| c.value),
             turntable: rig.turntable.as_ref().map(|c| c.value),
+            read_as: None,
         }
     }
 
@@ -93,7 +100,9 @@ impl Values {
         sigmas.check()?;
         let camera = self
             .intrinsics
-            .map(|c| Ok::<_, Fault>(known(imported(Kind::Camera, c, None, None, source)?, sigmas.camera())))
+            .map(|c| {
+                Ok::<_, Fault>(known(imported(Kind::Camera, c, None, self.read_as.clone(), source)?, sigmas.camera()))
+            })
             .transpose()?;
         // What comes without a camera belongs to the one that the station has.
         let theirs = if camera.is_none() { Rig::load_camera(station)?.camera } else { None };

@@ -2,6 +2,8 @@
 
 mod assumed;
 mod exchange;
+mod foreign;
 
 pub use assumed::Sigmas;
 pub use exchange::{PlaneValue, Values};
+pub use foreign::{Format as ValuesFormat, written as written_camera};

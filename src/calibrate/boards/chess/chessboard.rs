@@ -3,6 +3,7 @@
 
 use super::grid::{FrontEnd, Grid, Prepared, lattices};
 use super::growth::grown;
+use crate::calibrate::boards::other_size::WRONG_SIZE;
 use crate::calibrate::boards::refine::{Corner, Grey, Window};
 use crate::calibrate::boards::{BoardPoint, BoardView, FindOptions};
 use crate::fault::{Fault, Result};
@@ -228,7 +229,7 @@ fn why_not(best: Option<&Grid>, columns: usize, rows: usize, span: f64, grey: &G
     // A complete lattice that is larger than the one asked for is no board that was cut off.
     if grid.count() == c * r && c * r >= wc * wr && (!cut || (c >= wc && r >= wr && (c, r) != (wc, wr))) {
         return Fault::refused(seen)
-            .cause("wrong board size given")
+            .cause(WRONG_SIZE)
             .next(format!("if the board has {c}x{r} inner corners, say so in its description"));
     }
     if cut {

@@ -4,7 +4,6 @@
 use crate::calibrate::hand_eye::options::Mount;
 use crate::calibrate::joint::shots::Shot;
 use crate::calibrate::joint::solve::JointFit;
-use crate::calibrate::joint::start::near_from_far;
 use crate::calibrate::joint::volume::scanned;
 use crate::geometry::{Vec2, Vec3};
 
@@ -28,11 +27,11 @@ pub fn check(fit: &JointFit, mount: Mount, shots: &[Shot], calibration_mm: f64) 
     let place = fit.state.far_from_board.first()?;
     for shot in shots {
         let Some(robot) = shot.robot else { continue };
-        let board_from_near = place.inverse() * near_from_far(mount, &robot.pose).inverse();
+        let board_from_near = place.inverse() * mount.near_from_far(&robot.pose).inverse();
         let height = |pixel: &Vec2| Some(board_from_near.point(&scanned(&fit.state, pixel)?).z);
         let from_flange = |p: &Vec3| match mount {
             Mount::EyeInHand => p.norm(),
-            Mount::EyeToHand => near_from_far(mount, &robot.pose).inverse().point(p).norm(),
+            Mount::EyeToHand => mount.near_from_far(&robot.pose).inverse().point(p).norm(),
         };
         let before = points;
         for p in &shot.stripe {

@@ -6,7 +6,7 @@ use super::cell::{Cell, Went};
 use super::notebook::Notebook;
 use crate::calibrate::hand_eye::closed::{Pair, agree};
 use crate::calibrate::hand_eye::options::Mount;
-use crate::calibrate::joint::start::{board, near_from_far};
+use crate::calibrate::joint::start::board;
 use crate::calibrate::measured_pose::SeenBoard;
 use crate::camera::{CameraCovariance, Distortion, Intrinsics, Parameters};
 use crate::fault::{Fault, Result};
@@ -91,7 +91,7 @@ pub fn camera(stops: &[Stop], mount: Mount, size: [u32; 2]) -> Result<Intrinsics
     let misfit = |k: &Intrinsics| {
         let pair = |s: &Stop| {
             let seen = board(k, &SeenBoard::from_view(&s.name, &s.board, &s.view)).ok()?;
-            Some(Pair { near_from_far: near_from_far(mount, &s.robot?.pose), seen })
+            Some(Pair::new(mount.near_from_far(&s.robot?.pose), seen))
         };
         let pairs: Vec<Pair> = stops.iter().filter_map(pair).collect();
         // In px: a camera that puts the board far away must not be preferred for its millimetres.

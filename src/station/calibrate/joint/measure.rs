@@ -15,7 +15,6 @@ use crate::calibrate::hand_eye::options::{HandEyeOptions, Mount};
 use crate::calibrate::hand_eye::solve::solve as solve_hand_eye;
 use crate::calibrate::hand_eye::turns::{read_with, resolve};
 use crate::calibrate::joint::shots::{LeftOut, Part, Shot, Spot, thinned};
-use crate::calibrate::joint::start::near_from_far;
 use crate::calibrate::laser_plane::solve::{LaserPlaneFit, PeakUse};
 use crate::calibrate::laser_plane::views::StripePeak;
 use crate::calibrate::measured_pose::{MeasuredPose, SeenBoard, measure_view, pooled_factor};
@@ -130,7 +129,7 @@ fn robots(boards: &[Placed<'_>], place: usize, how: &Finders<'_>, out: &mut Meas
     }
     let pair = |&i: &usize| {
         let reported = boards[i].0.robot.expect("filtered");
-        Pair { near_from_far: near_from_far(how.mount, &reported.pose), seen: boards[i].1.clone() }
+        Pair::new(how.mount.near_from_far(&reported.pose), boards[i].1.clone())
     };
     let mut pairs: Vec<Pair> = here.iter().map(pair).collect();
     if here.iter().any(|&i| boards[i].0.view.ambiguous) {

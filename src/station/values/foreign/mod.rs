@@ -1,0 +1,10 @@
+//! Camera calibrations as other programs write them: OpenCV, ROS, Kalibr, MATLAB, HALCON.
+
+mod cameras;
+mod halcon;
+mod tree;
+mod write;
+mod yaml;
+
+pub use cameras::camera;
+pub use write::{Format, written};
