@@ -44,7 +44,9 @@ fn tuning_finds_the_exposure_and_the_camera_keeps_it() {
         let tuned = lights.lit(Beam::Line, || tune(&mut camera, |_, _| tries += 1)).unwrap();
         let peak = tuned.look.stripe.unwrap().peak;
         println!("from {from} us: {:.0} us after {tries} tries, peak {peak:.2}", tuned.exposure_us);
-        assert!((WANTED[0]..=WANTED[1]).contains(&peak) && tries > 1, "{peak}");
+        // The sensor's hot pixels saturate first here: tuning settles below that, and says so.
+        let settled = tuned.remark.is_some() && (0.5..WANTED[0]).contains(&peak);
+        assert!(((WANTED[0]..=WANTED[1]).contains(&peak) || settled) && tries > 1, "{peak} {:?}", tuned.remark);
         assert!((100.0..5000.0).contains(&tuned.exposure_us), "{} us", tuned.exposure_us);
         // Whoever connects next finds it, and says it of every picture.
         let mut next = self::camera(&set, -1.0);
