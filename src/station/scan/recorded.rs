@@ -1,8 +1,9 @@
 //! In: a recording, a station. Out: its scan, with the station's own settings; by what a resumed scan knows the recording.
 //! Frame and unit: cloud in the base frame, mm.
 
+use super::options::ScanOptions;
 use super::report::ScanReport;
-use super::run::{ScanOptions, scan};
+use super::run::scan;
 use crate::fault::Result;
 use crate::raster::{Image, Pixels};
 use crate::recording::{Motion, Recording};
