@@ -9,7 +9,32 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import TypeAlias
 
-__all__: list[str]
+__all__ = [
+    "Calibration",
+    "Camera",
+    "Found",
+    "HeightMap",
+    "Live",
+    "Recipe",
+    "Recording",
+    "Scan",
+    "Simulation",
+    "Station",
+    "Template",
+    "__version__",
+    "calibrate_camera",
+    "calibrate_hand_eye",
+    "calibrate_laser_plane",
+    "find",
+    "match_template",
+    "notations",
+    "numbers_from_pose",
+    "picture_points",
+    "pose_from_numbers",
+    "scan",
+    "simulate",
+    "teach",
+]
 __version__: str
 
 _Array: TypeAlias = npt.NDArray[Any]
