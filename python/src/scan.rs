@@ -102,7 +102,7 @@ impl Scan {
 
 /// What is to be scanned.
 enum What {
-    Recorded(recording::Recording, Option<String>),
+    Recorded(Box<recording::Recording>, Option<String>),
     Given(PythonSource),
 }
 
@@ -188,7 +188,7 @@ fn to_scan(
                 .next("leave them out; Recording(folder, poses=NAME) chooses another pose file"),
         ));
     }
-    Ok(What::Recorded(recording.inner, recording.poses))
+    Ok(What::Recorded(Box::new(recording.inner), recording.poses))
 }
 
 /// The scan in memory.
