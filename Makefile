@@ -30,6 +30,8 @@ lint:
 		$(CARGO) clippy --locked --all-targets -- -D warnings; \
 	else echo "clippy is not installed: skipped"; fi
 	$(CARGO) check --locked --package outside
+	if $(CARGO) clippy --version >/dev/null 2>&1; then \
+		$(CARGO) clippy --locked --package sheetlight-python --features whole -- -D warnings; fi
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 
 bench: vulkan build
@@ -54,7 +56,7 @@ browser:
 cameras:
 	tools/cameras.sh
 
-# The scorer of the reference data and the comparisons need numpy, scipy and libigl.
+# The scorer of the reference data and the comparisons need numpy, scipy and libigl; the Python package maturin, mypy and pytest.
 python:
 	tools/python-env.sh $(VENV) test
 

@@ -14,7 +14,7 @@ fn main() -> Result<()> {
     eprintln!();
     let (camera, known) = (&result.calibration.value, &result.calibration.covariance);
     for (name, value) in [("fx", camera.fx), ("fy", camera.fy), ("cx", camera.cx), ("cy", camera.cy)] {
-        println!("{name} {value:.3} +- {:.3} px", known.sigma(name).unwrap_or(f64::NAN));
+        println!("{name} {value:.3} +- {:.3} px", known.sigma(&format!("{name}_px")).unwrap_or(f64::NAN));
     }
     println!("verdict: {}", result.calibration.quality.verdict.words());
     for advice in &result.calibration.quality.advice {

@@ -1,18 +1,20 @@
 #!/usr/bin/env bash
-# In: a folder and a set of packages (test, peers). Out: a Python environment with them, for judges and peers only.
-# Sheetlight itself never needs Python; without one the tests that need it say that they were skipped.
+# Makes a Python environment with a set of packages (test, peers) in a folder: for judges, peers and the tests of the
+# Python package. Sheetlight itself never needs Python; without one the tests that need it say that they were skipped.
 set -eu
 folder=$1 set=$2
 case $set in
-  test) packages="numpy scipy libigl" ;;
+  test) packages="numpy scipy libigl maturin==1.* mypy pytest" ;;
   peers) packages="numpy scipy numba opencv-contrib-python-headless==4.14.*" ;;
   *) echo "python-env.sh: unknown set '$set': test or peers" >&2; exit 2 ;;
 esac
+# Holds the packages, so that an environment of a former version gets what is new.
 stamp="$folder/.has-$set"
-[ -e "$stamp" ] && exit 0
-if ! { [ -x "$folder/bin/python" ] || python3 -m venv "$folder"; } || ! "$folder/bin/python" -m pip install -q $packages; then
+[ -e "$stamp" ] && [ "$(cat "$stamp")" = "$packages" ] && exit 0
+make_it() { [ -x "$folder/bin/python" ] || python3 -m venv "$folder"; }
+if ! make_it || ! "$folder/bin/python" -m pip install -q $packages; then
   echo "no Python environment with $packages: the tests that need it will be skipped" >&2
   [ "${CI:-}" != true ]
   exit
 fi
-touch "$stamp"
+echo "$packages" >"$stamp"

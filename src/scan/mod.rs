@@ -39,7 +39,7 @@ pub use map::picture::{MapPlace, Shown};
 pub use map::spec::{GridOptions, GridSpec};
 pub use pcd::write_pcd;
 pub use processor::{Processor, Where, Why};
-pub use refine::{PathFound, SheetFound, Straight, Thick, straight};
+pub use refine::{PathFound, Refining, SheetFound, Straight, Thick, straight};
 pub use scanner::{Profile, Scanner};
 pub use shift::plateau::Plateau;
 pub use shift::scan::{ShiftReport, ShiftRig, Side, shift_scan};

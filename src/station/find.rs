@@ -3,6 +3,7 @@
 //! Frame and unit: the scan's frame, mm; plans of a second look: base.
 
 use super::height_witness::height_witness;
+use super::scan::held::HeldScan;
 use super::scan::report::{ScanReport, lit_cloud_of, load_report, shots_of};
 use crate::fault::{Fault, Result};
 use crate::find::insert::picture;
@@ -12,7 +13,7 @@ use crate::geometry::{AxisKind, Base, Flange, Rigid, Vec3};
 use crate::raster::RgbImage;
 use crate::recording::Recording;
 use crate::rig::Rig;
-use crate::scan::{GridOptions, grid, parts_for};
+use crate::scan::{CloudPoint, GridOptions, Shots, grid, parts_for};
 use std::path::{Path, PathBuf};
 
 /// What is known of one part: finished scans of it, and pictures of the pointer's spot on it.
@@ -131,10 +132,43 @@ pub fn find_part(
         fits(rig, scan, &scanned)?;
     }
     let (cloud, shots) = (lit_cloud_of(scan)?, shots_of(scan)?);
+    let report = located(&cloud, &shots, &scanned, recipe, rig.as_ref(), options).map_err(|e| e.at(scan.display()))?;
+    let image = picture::draw(&report, &recipe.drawing());
+    Ok((report, image))
+}
+
+/// Finds the recipe's part in a scan in memory; `rig` is the one that scanned. Without it the budget lacks the calibrations.
+pub fn find_part_held(
+    held: &HeldScan,
+    recipe: &Recipe,
+    rig: Option<&Rig>,
+    options: &LocateOptions,
+) -> Result<(Report, RgbImage)> {
+    let scanned = &held.report;
+    scanned.has_points()?;
+    let rig = rig.map(|rig| parts_for(rig, &scanned.motion));
+    if let Some(rig) = &rig {
+        rig.belong_together()?;
+        fits(rig, Path::new("the scan"), scanned)?;
+    }
+    let report = located(&held.lit(), &held.shots, scanned, recipe, rig.as_ref(), options)?;
+    let image = picture::draw(&report, &recipe.drawing());
+    Ok((report, image))
+}
+
+/// The part in a scan's points, where the sheet's middle meets the rays of their light.
+fn located(
+    cloud: &[CloudPoint],
+    shots: &Shots,
+    scanned: &ScanReport,
+    recipe: &Recipe,
+    rig: Option<&Rig>,
+    options: &LocateOptions,
+) -> Result<Report> {
     // A turntable's part turns before the camera: heights are those over the table, z of the axis frame.
     let over_table = (scanned.motion.axis() == Some(AxisKind::Turntable)).then(Vec3::z);
     let options = &LocateOptions { up: options.up.or(over_table), ..options.clone() };
-    let mut report = locate(&cloud, &shots, recipe, rig.as_ref(), options).map_err(|e| e.at(scan.display()))?;
+    let mut report = locate(cloud, shots, recipe, rig, options)?;
     if scanned.frame != report.frame {
         report.notes.push(format!(
             "all poses are in the {} frame of the scan, not in a robot's base (docs/conventions.md)",
@@ -142,9 +176,8 @@ pub fn find_part(
         ));
         report.frame = scanned.frame.clone();
     }
-    report.notes.extend(scanned.remarks);
-    let image = picture::draw(&report, &recipe.drawing());
-    Ok((report, image))
+    report.notes.extend_from_slice(&scanned.remarks);
+    Ok(report)
 }
 
 /// Refuses a scan that was made with other calibrations than the station's present ones.
@@ -164,9 +197,18 @@ pub(super) fn fits(rig: &Rig, scan: &Path, scanned: &ScanReport) -> Result<()> {
 
 /// Teaches a part from a finished scan: the recipe, its proof on that scan, and a picture of it.
 pub fn teach_part(scan: &Path, options: &TeachOptions) -> Result<(Recipe, Report, RgbImage)> {
-    let (cloud, shots) = (lit_cloud_of(scan)?, shots_of(scan)?);
-    let map = grid(&cloud, &GridOptions::default())?;
-    let (recipe, proof) = teach(&cloud, &shots, &map, options).map_err(|e| e.at(scan.display()))?;
+    taught(&lit_cloud_of(scan)?, &shots_of(scan)?, options).map_err(|e| e.at(scan.display()))
+}
+
+/// The same from a scan in memory.
+pub fn teach_held(held: &HeldScan, options: &TeachOptions) -> Result<(Recipe, Report, RgbImage)> {
+    held.report.has_points()?;
+    taught(&held.lit(), &held.shots, options)
+}
+
+fn taught(cloud: &[CloudPoint], shots: &Shots, options: &TeachOptions) -> Result<(Recipe, Report, RgbImage)> {
+    let map = grid(cloud, &GridOptions::default())?;
+    let (recipe, proof) = teach(cloud, shots, &map, options)?;
     let image = picture::draw(&proof, &recipe.drawing());
     Ok((recipe, proof, image))
 }

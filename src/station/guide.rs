@@ -4,9 +4,9 @@
 //! Frame and unit: base frame; mm, degrees.
 
 use super::range::{RangeReport, RangeRun, SurfaceFound, measure_range};
+use super::scan::options::ScanOptions;
 use super::scan::recorded::scan_recording;
 use super::scan::report::ScanReport;
-use super::scan::run::ScanOptions;
 use super::settings::Settings;
 use super::volume;
 use crate::fault::{Fault, Result};

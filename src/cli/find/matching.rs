@@ -171,11 +171,9 @@ fn options(args: &Args) -> Result<SearchOptions> {
         angles_deg: args.angles.unwrap_or(defaults.angles_deg),
         scales: args.scales.unwrap_or(defaults.scales),
         min_score: args.score,
-        max_matches,
         max_overlap: args.overlap,
         ignore_polarity: args.ignore_polarity,
-        candidates: if max_matches > 1 { 2000 } else { defaults.candidates },
-        ..defaults
+        ..defaults.at_most(max_matches)
     };
     options.check()?;
     Ok(options)
@@ -248,16 +246,11 @@ fn said_of(t: &Template) -> serde_json::Value {
         "edges": t.model.levels[0].len(), "reference": "the middle of the region"})
 }
 
-/// The turn within the range that was asked for: 350 of 0..360, -10 of -180..180.
 fn listed(m: Match, options: &SearchOptions) -> Listed {
-    let first = options.angles_deg[0];
-    let turned = m.pose.angle.to_degrees();
-    // A turn that is held may lie below the first by a rounding error.
-    let angle_deg = first - 1.0 + (turned - first + 1.0).rem_euclid(360.0);
     Listed {
         x_px: m.pose.x,
         y_px: m.pose.y,
-        angle_deg,
+        angle_deg: options.turn_deg(m.pose.angle),
         scale: m.pose.scale,
         score: m.score,
         sigma_px: m.sigma_px,

@@ -36,6 +36,9 @@ pub struct Free {
     pub scale: bool,
 }
 
+/// Candidates where several matches are wanted.
+const SEVERAL: usize = 2000;
+
 impl Default for SearchOptions {
     fn default() -> Self {
         SearchOptions {
@@ -73,6 +76,19 @@ impl SearchOptions {
     /// Whether turn and scale are measured: of a range of one value both ends are what they are said to be.
     pub(super) fn free(&self) -> Free {
         Free { angle: self.angles_deg[1] > self.angles_deg[0], scale: self.scales[1] > self.scales[0] }
+    }
+
+    /// The same for up to so many matches: of several, weaker candidates are carried on too.
+    pub fn at_most(self, matches: usize) -> SearchOptions {
+        let candidates = if matches > 1 { SEVERAL } else { self.candidates };
+        SearchOptions { max_matches: matches, candidates, ..self }
+    }
+
+    /// A turn (rad) in degrees within the range that was asked for: 350 of 0..360, -10 of -180..180.
+    pub fn turn_deg(&self, angle: f64) -> f64 {
+        let first = self.angles_deg[0];
+        // A turn that is held may lie below the first by a rounding error.
+        first - 1.0 + (angle.to_degrees() - first + 1.0).rem_euclid(360.0)
     }
 
     /// Refuses options outside their ranges.

@@ -3,8 +3,10 @@
 //! Frame and unit: the cloud's frame, mm.
 
 mod path;
+mod refining;
 mod sheet;
 mod slope;
 
 pub use path::{PathFound, Straight, straight};
+pub use refining::Refining;
 pub use sheet::{SheetFound, Thick};

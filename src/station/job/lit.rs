@@ -10,8 +10,8 @@ use crate::fault::{Fault, Result};
 use crate::recording::Beam;
 use crate::rig::Rig;
 use crate::scan::Where;
+use crate::station::scan::options::ScanOptions;
 use crate::station::scan::recorded::scan_recording;
-use crate::station::scan::run::ScanOptions;
 use crate::station::settings::Settings;
 use std::path::Path;
 

@@ -1,6 +1,9 @@
 //! In: a source of shots, a station. Out: the scan's folder: cloud, height map, pictures, report.
 //! Frame and unit: cloud in the base frame, mm (docs/file-formats.md).
 
+mod done;
+pub(super) mod held;
+pub(super) mod options;
 mod overlays;
 pub(super) mod products;
 pub mod progress;

@@ -11,6 +11,9 @@ use crate::scan::{CloudFile, GridOptions, HeightMap, grid_on, write_pcd};
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// Points that a height map is made of, at least.
+pub(super) const FEWEST_OF_A_MAP: u64 = 100;
+
 /// Writes everything that is derived from the cloud; no figures where there are too few points for a map. With them
 /// come the SHA-256 of cloud and map by file name.
 pub fn write(
@@ -21,7 +24,7 @@ pub fn write(
     up: Vec3,
     device: Option<&Device>,
 ) -> Result<(Option<HeightMapFigures>, BTreeMap<String, String>)> {
-    if points < 100 {
+    if points < FEWEST_OF_A_MAP {
         return Ok((None, BTreeMap::from([hash(out, "cloud.ply")?])));
     }
     let source = CloudFile::open(cloud)?;
@@ -59,7 +62,8 @@ fn hashes(out: &Path, of_cloud: (String, String)) -> Result<BTreeMap<String, Str
     Ok(BTreeMap::from([of_cloud, hash(out, "height.tif")?, hash(out, "height.json")?]))
 }
 
-fn figures(map: &HeightMap) -> HeightMapFigures {
+/// What a report says of a map.
+pub(super) fn figures(map: &HeightMap) -> HeightMapFigures {
     let (low, high) = map.quantiles(0.01, 0.99).unwrap_or((0.0, 0.0));
     HeightMapFigures {
         width: map.width,

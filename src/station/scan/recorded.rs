@@ -2,8 +2,9 @@
 //! recording.
 //! Frame and unit: cloud in the base frame, mm.
 
+use super::options::ScanOptions;
 use super::report::ScanReport;
-use super::run::{ScanOptions, scan};
+use super::run::scan;
 use crate::fault::Result;
 use crate::raster::{Image, Pixels};
 use crate::recording::{Motion, Recording};

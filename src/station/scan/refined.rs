@@ -7,10 +7,7 @@ use super::scan_folder::{CLOUD_FILE, MEASURED};
 use super::spread::Spread;
 use crate::fault::{Fault, Result};
 use crate::files::moment;
-use crate::scan::{
-    Along, CloudFile, CloudPoint, CloudWriter, Extraction, Format, PathFound, PointSource, SHOTS_FILE, SheetFound,
-    Shots, Straight, Thick, straight,
-};
+use crate::scan::{CloudFile, CloudWriter, Extraction, Format, PathFound, Refining, SHOTS_FILE, SheetFound, Shots};
 use std::path::Path;
 
 /// Where the cloud is made that takes the measured one's name.
@@ -25,25 +22,6 @@ pub(super) struct Refined {
     pub median_sigma_mm: Option<f64>,
 }
 
-/// A cloud with its shots on the path that the camera went.
-struct OnPath<'a> {
-    cloud: &'a CloudFile,
-    path: Option<&'a Straight>,
-}
-
-impl PointSource for OnPath<'_> {
-    fn for_each_chunk(&self, take: &mut dyn FnMut(&[CloudPoint])) -> Result<()> {
-        let Some(path) = self.path else { return self.cloud.for_each_chunk(take) };
-        let mut points: Vec<CloudPoint> = Vec::new();
-        self.cloud.for_each_chunk(&mut |chunk| {
-            points.clear();
-            points.extend_from_slice(chunk);
-            path.apply(&mut points);
-            take(&points);
-        })
-    }
-}
-
 /// `part`: the working folder; `frame`: the cloud's; `shots`: where they were reported.
 pub(super) fn refine(
     part: &Path,
@@ -53,39 +31,22 @@ pub(super) fn refine(
     settings: &Extraction,
 ) -> Result<Refined> {
     let cloud = CloudFile::open(&part.join(CLOUD_FILE))?;
-    let pixels = if shots.along == Along::U { format.width } else { format.height };
-    let path = if settings.straighten { straight(&cloud, &shots, pixels)? } else { None };
-    let places = path.as_ref().map(|p| p.found);
-    let path = path.filter(|p| p.found.taken_out);
-    let shots = if let Some(p) = &path { p.shots(&shots) } else { shots };
-    let on_path = OnPath { cloud: &cloud, path: path.as_ref() };
-    let thick = if settings.thick_sheet { Thick::of(&on_path, &shots)? } else { None };
-    if path.is_none() && thick.is_none() {
+    let refining = Refining::of(&cloud, shots, format, settings)?;
+    let places = refining.places;
+    if !refining.changes() {
         return Ok(Refined { places, ..Refined::default() });
     }
     let next = part.join(NEXT);
     let mut out = CloudWriter::create_in(&next, frame)?;
     let mut spread = Spread::default();
-    let sheet = match thick {
-        Some(thick) => Some(thick.apply(&on_path, &shots, &mut |points| {
-            spread.add(points);
-            out.append(points)
-        })?),
-        None => {
-            let mut written = Ok(());
-            on_path.for_each_chunk(&mut |points| {
-                if written.is_ok() {
-                    written = out.append(points);
-                }
-            })?;
-            written?;
-            None
-        }
-    };
+    let sheet = refining.apply(&cloud, &mut |points| {
+        spread.add(points);
+        out.append(points)
+    })?;
     out.finish()?;
     rename(&part.join(CLOUD_FILE), &part.join(MEASURED[0]))?;
     rename(&next, &part.join(CLOUD_FILE))?;
-    if let Some(path) = &path {
+    if let Some(path) = refining.path() {
         let places = Shots::rewritten(part, |shot, place| path.place(shot, place))?;
         rename(&part.join(SHOTS_FILE), &part.join(MEASURED[1]))?;
         crate::files::write(&part.join(SHOTS_FILE), places.as_bytes())?;

@@ -3,59 +3,25 @@
 //! Frame and unit: cloud in the frame of what moved (mostly the robot's base), height map in its grid frame; mm
 //! (docs/file-formats.md).
 
+use super::done::{Done, scanner_for};
+use super::options::ScanOptions;
 use super::overlays::Overlays;
 use super::progress::{Checkpoint, fingerprint_of};
-use super::refined::{Refined, refine};
-use super::report::{FORMAT, ScanReport, Spent};
+use super::refined::refine;
+use super::report::{ScanReport, Spent};
 use super::scan_folder::{self, CLOUD_FILE, FORMER_PROGRESS};
 use super::seen::Seen;
-use super::watch::Watch;
-use crate::capture::{Delays, Latency};
+use crate::capture::Delays;
 use crate::fault::{Fault, Result};
 use crate::files::Lock;
-use crate::raster::Image;
-use crate::recording::Motion;
-use crate::rig::{Rig, Volume};
+use crate::rig::Rig;
 use crate::scan::{
-    BadShot, Carrier, CloudWriter, Extraction, GridOptions, Processor, Profile, SHOTS_FILE, Scanner, Shots,
-    ShotsWriter, Source, Where, parts_for,
+    BadShot, CloudWriter, Processor, Profile, SHOTS_FILE, Scanner, Shots, ShotsWriter, Source, parts_for,
 };
 use std::collections::VecDeque;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::path::Path;
+use std::sync::atomic::Ordering;
 use std::time::Instant;
-
-/// How a scan is run.
-#[derive(Clone, Debug)]
-pub struct ScanOptions {
-    /// Folder for the results; made where it is missing.
-    pub out: PathBuf,
-    /// GPU, this machine's processor, or whichever of them is faster.
-    pub place: Where,
-    /// How the stripe is found.
-    pub extraction: Extraction,
-    /// How the cloud becomes a height map.
-    pub grid: GridOptions,
-    /// What moved between the shots.
-    pub motion: Motion,
-    /// Camera depths at which points are believed; `None` for all ([`crate::station::volume::believed`]).
-    pub volume: Option<Volume>,
-    /// A picture with the laser off and the shots' exposure, subtracted from every shot.
-    pub ambient: Option<Image>,
-    /// Shots to draw with their kept and rejected peaks, evenly spread; 0 for none.
-    pub overlays: usize,
-    /// Leave out shots that cannot be read instead of stopping; they are listed in scan.json.
-    pub skip_bad: bool,
-    /// By how much pictures are late against poses, of those that were paired by clock.
-    pub latency: Option<Latency>,
-    /// Continue an interrupted scan of the same recording with the same rig and settings.
-    pub resume: bool,
-    /// Set by somebody who wants the scan to end: it keeps what is done and says how to go on.
-    pub stop: Arc<AtomicBool>,
-    /// Who looks on while it runs.
-    pub watch: Watch,
-}
 
 /// Shots between two checkpoints: what a crash can cost beside those under way.
 const CHECKPOINT_SHOTS: usize = 64;
@@ -187,16 +153,8 @@ impl<'a> Work<'a> {
             CloudWriter::create_in(&cloud_path, options.motion.frame())?
         };
         let total = source.remaining().map(|n| n + first - repeated);
-        let (pictures, volume) = (source.pictures(), options.volume.as_ref());
-        let carrier = Carrier::new(rig, &options.motion)?;
-        let ambient = options.ambient.clone();
-        let scanner = Scanner::new(rig, carrier, pictures, &options.extraction, volume, ambient, processor)?.resumed(
-            state.stripe,
-            state.hot.clone(),
-            state.first_place(),
-        );
-        let camera = rig.need_camera()?.for_pictures(pictures.size(), pictures.readout.as_ref())?;
-        let seen = Seen::new(&camera, &rig.need_laser_plane()?.value, Volume::depths(volume));
+        let (scanner, seen) = scanner_for(rig, source.pictures(), options, processor)?;
+        let scanner = scanner.resumed(state.stripe, state.hot.clone(), state.first_place());
         let print = rig.fingerprint();
         let shots = if resumed {
             ShotsWriter::resume(part, first, options.motion.frame(), &print)?
@@ -320,12 +278,11 @@ impl<'a> Work<'a> {
 
     /// What is derived from the whole cloud, and the report of it all.
     fn finish(self, label: &str, rig: &Rig, options: &ScanOptions, source: &dyn Source) -> Result<ScanReport> {
-        let Work { part, cloud, mut state, scanner, mut spent, .. } = self;
+        let Work { part, cloud, state, scanner, mut spent, .. } = self;
         let points = cloud.finish()?;
-        let (format, print) = (source.format(), rig.fingerprint());
         let frame = options.motion.frame();
-        let shots = Shots::load(part, frame, &print)?.with_stripe(scanner.stripe().map(|s| s.width_px));
-        let Refined { places, sheet, median_sigma_mm } = refine(part, frame, shots, format, &options.extraction)?;
+        let shots = Shots::load(part, frame, &rig.fingerprint())?.with_stripe(scanner.stripe().map(|s| s.width_px));
+        let refined = refine(part, frame, shots, source.format(), &options.extraction)?;
         let seconds = self.started.elapsed().as_secs_f64();
         let products = Instant::now();
         let (cloud_path, up) = (part.join(CLOUD_FILE), scanner.up_in_base());
@@ -333,44 +290,23 @@ impl<'a> Work<'a> {
             super::products::write(part, &cloud_path, points, &options.grid, up, scanner.device())?;
         files.extend([super::products::hash(part, SHOTS_FILE)?]);
         spent.products_s = products.elapsed().as_secs_f64();
-        if state.cut > 0 {
-            state.peaks.insert("beyond the list: more than a twentieth of the pictures lit".into(), state.cut);
-        }
-        Ok(ScanReport {
-            format: FORMAT,
-            program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),
-            created: jiff::Timestamp::now().to_string(),
-            units: "mm".into(),
-            frame: options.motion.frame().into(),
-            motion: options.motion.clone(),
-            recording: label.into(),
-            rig_fingerprint: print,
-            working_volume: options.volume.clone(),
-            ran_on: scanner.ran_on(),
-            image: format,
-            shots: state.shots,
-            points,
-            median_sigma_mm: median_sigma_mm.or(state.sigma.median_mm()),
-            stripe: scanner.stripe(),
-            places,
-            sheet,
-            hot_pixels: scanner.hot().count(),
+        let done = Done {
+            label,
+            rig,
+            options,
+            source,
+            scanner: &scanner,
+            shots_of_this_run: state.shots - self.first,
+            state,
             seen: self.seen,
-            peaks: state.peaks,
-            dark_shots: state.dark,
-            camera: source.account(),
             delay: self.delays.so_far(),
-            skipped: state.skipped,
             seconds,
-            shots_per_second: (state.shots - self.first) as f64 / seconds.max(1e-9),
             spent,
-            settings: options.extraction.clone(),
-            height_map,
-            remarks: rig.remarks().into_iter().chain(source.remarks()).chain(self.stopped).collect(),
-            files,
-            imported: None,
-            filtered: None,
-        })
+            stopped: self.stopped,
+            points,
+            refined,
+        };
+        Ok(done.report(height_map, files))
     }
 }
 

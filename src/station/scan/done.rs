@@ -1,0 +1,93 @@
+//! Makes a finished scan's report, wherever its points are kept. Lengths are mm.
+
+use super::options::ScanOptions;
+use super::progress::Checkpoint;
+use super::refined::Refined;
+use super::report::{FORMAT, HeightMapFigures, ScanReport, Spent};
+use super::seen::Seen;
+use crate::capture::Delay;
+use crate::fault::Result;
+use crate::rig::{Rig, Volume};
+use crate::scan::{Carrier, Pictures, Processor, Scanner, Source};
+use std::collections::BTreeMap;
+
+/// What the last shot of a scan leaves.
+pub(super) struct Done<'a> {
+    pub label: &'a str,
+    pub rig: &'a Rig,
+    pub options: &'a ScanOptions,
+    pub source: &'a dyn Source,
+    pub scanner: &'a Scanner,
+    pub state: Checkpoint,
+    pub seen: Seen,
+    pub delay: Option<Delay>,
+    /// From the first shot to the refined cloud.
+    pub seconds: f64,
+    pub spent: Spent,
+    /// Shots that this run did.
+    pub shots_of_this_run: usize,
+    /// Said where a stream was ended before its end.
+    pub stopped: Option<String>,
+    pub points: u64,
+    pub refined: Refined,
+}
+
+impl Done<'_> {
+    /// `files`: hashes of what was written, by name.
+    pub fn report(self, height_map: Option<HeightMapFigures>, files: BTreeMap<String, String>) -> ScanReport {
+        let Done { options, scanner, mut state, .. } = self;
+        if state.cut > 0 {
+            state.peaks.insert("beyond the list: more than a twentieth of the pictures lit".into(), state.cut);
+        }
+        ScanReport {
+            format: FORMAT,
+            program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),
+            created: jiff::Timestamp::now().to_string(),
+            units: "mm".into(),
+            frame: options.motion.frame().into(),
+            motion: options.motion.clone(),
+            recording: self.label.into(),
+            rig_fingerprint: self.rig.fingerprint(),
+            working_volume: options.volume.clone(),
+            ran_on: scanner.ran_on(),
+            image: self.source.format(),
+            shots: state.shots,
+            points: self.points,
+            median_sigma_mm: self.refined.median_sigma_mm.or(state.sigma.median_mm()),
+            stripe: scanner.stripe(),
+            places: self.refined.places,
+            sheet: self.refined.sheet,
+            hot_pixels: scanner.hot().count(),
+            seen: self.seen,
+            peaks: state.peaks,
+            dark_shots: state.dark,
+            camera: self.source.account(),
+            delay: self.delay,
+            skipped: state.skipped,
+            seconds: self.seconds,
+            shots_per_second: self.shots_of_this_run as f64 / self.seconds.max(1e-9),
+            spent: self.spent,
+            settings: options.extraction.clone(),
+            height_map,
+            remarks: self.rig.remarks().into_iter().chain(self.source.remarks()).chain(self.stopped).collect(),
+            files,
+            imported: None,
+            filtered: None,
+        }
+    }
+}
+
+/// What measures the shots of such pictures, and what looks at their levels.
+pub(super) fn scanner_for(
+    rig: &Rig,
+    pictures: Pictures,
+    options: &ScanOptions,
+    processor: Processor,
+) -> Result<(Scanner, Seen)> {
+    let (volume, ambient) = (options.volume.as_ref(), options.ambient.clone());
+    let carrier = Carrier::new(rig, &options.motion)?;
+    let scanner = Scanner::new(rig, carrier, pictures, &options.extraction, volume, ambient, processor)?;
+    let camera = rig.need_camera()?.for_pictures(pictures.size(), pictures.readout.as_ref())?;
+    let seen = Seen::new(&camera, &rig.need_laser_plane()?.value, Volume::depths(volume));
+    Ok((scanner, seen))
+}

@@ -1,0 +1,151 @@
+//! Scans into memory: the points and the height map that a scan folder would hold, for programs that have their own
+//! pictures. Points are in the frame of what moved (mostly the robot's base), mm.
+
+use super::done::{Done, scanner_for};
+use super::options::ScanOptions;
+use super::products::{FEWEST_OF_A_MAP, figures};
+use super::progress::Checkpoint;
+use super::refined::Refined;
+use super::report::{ScanReport, Spent};
+use super::spread::Spread;
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Camera, Rigid};
+use crate::rig::Rig;
+use crate::scan::{
+    CloudPoint, Extraction, Format, GridOptions, HeightMap, Profile, Refining, Shots, Source, grid_on, parts_for,
+};
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+/// A scan in memory.
+pub struct HeldScan {
+    /// What scan.json would say; it names no files.
+    pub report: ScanReport,
+    /// The points of cloud.ply, in its order.
+    pub points: Vec<CloudPoint>,
+    /// Where the camera stood at each shot.
+    pub shots: Shots,
+    /// `None` where there are too few points for a map.
+    pub map: Option<HeightMap>,
+}
+
+impl HeldScan {
+    /// The points where the sheet's middle meets the rays of their light, as [`super::report::lit_cloud_of`] has them.
+    pub(in crate::station) fn lit(&self) -> Vec<CloudPoint> {
+        let mut points = self.points.clone();
+        if self.report.sheet.is_some() {
+            self.shots.onto_sheet(&mut points);
+        }
+        points
+    }
+}
+
+/// Points and places as the shots come.
+#[derive(Default)]
+struct Gathered {
+    points: Vec<CloudPoint>,
+    places: Vec<(u32, Rigid<Base, Camera>)>,
+}
+
+impl Gathered {
+    fn take(&mut self, profile: &Profile) -> Result<()> {
+        self.points.extend_from_slice(&profile.points);
+        // To the last bit what a scan folder's list of shots gives back: the refined points follow from it.
+        let (place, _) = Rigid::from_rows(&profile.from_camera.to_rows())?;
+        self.places.push((profile.shot, place));
+        Ok(())
+    }
+}
+
+/// Scans a source from its first shot to its last and keeps the result in memory; the points are those that a scan
+/// into a folder writes. `label` names what was scanned. Of the options `out`, `overlays`, `resume` and `watch` are
+/// not used. `progress` is told (shots done, shots in all).
+///
+/// # Errors
+/// A rig that does not suit, a bad shot unless `skip_bad` leaves it out, a stop that was asked for.
+pub fn scan_held(
+    label: &str,
+    source: &mut dyn Source,
+    rig: &Rig,
+    options: &ScanOptions,
+    mut progress: impl FnMut(usize, Option<usize>),
+) -> Result<HeldScan> {
+    let started = Instant::now();
+    options.grid.check()?;
+    let rig = &parts_for(rig, &options.motion);
+    rig.belong_together()?;
+    rig.reaches(options.volume.as_ref())?;
+    let (mut scanner, mut seen) = scanner_for(rig, source.pictures(), options, options.place.open()?)?;
+    let total = source.remaining();
+    let (mut state, mut gathered, mut ended) = (Checkpoint::new(String::new()), Gathered::default(), false);
+    while !ended {
+        let next = source.next();
+        if options.stop.load(Ordering::Relaxed) {
+            return Err(Fault::output("the scan was stopped before its end")
+                .cause("somebody asked for it")
+                .next("scan again"));
+        }
+        match next {
+            Some(Ok(shot)) => {
+                seen.look(shot.index, &shot.image);
+                scanner.push(shot)?;
+            }
+            Some(Err(bad)) if options.skip_bad && !bad.last => state.skipped.push((bad.name, bad.fault.what)),
+            Some(Err(bad)) => return Err(if bad.last { bad.fault } else { bad.fault.at(bad.name) }),
+            None => ended = true,
+        }
+        for profile in if ended { scanner.finish()? } else { scanner.ready()? } {
+            gathered.take(&profile)?;
+            state.add(&profile);
+        }
+        progress(state.shots, total);
+    }
+    state.cut = scanner.cut();
+    let stripe_px = scanner.stripe().map(|s| s.width_px);
+    let mut shots = Shots::new(scanner.stripe_along(), gathered.places).with_stripe(stripe_px);
+    shots.sheet = Some(rig.need_laser_plane()?.value);
+    let (points, shots, refined) = refine(gathered.points, shots, source.format(), options)?;
+    let seconds = started.elapsed().as_secs_f64();
+    let grid = GridOptions { up: scanner.up_in_base(), ..options.grid.clone() };
+    let enough = points.len() as u64 >= FEWEST_OF_A_MAP;
+    let map = enough.then(|| grid_on(&points, &grid, scanner.device())).transpose()?;
+    let done = Done {
+        label,
+        rig,
+        options,
+        source,
+        scanner: &scanner,
+        shots_of_this_run: state.shots,
+        state,
+        seen,
+        delay: None,
+        seconds,
+        spent: Spent::default(),
+        stopped: None,
+        points: points.len() as u64,
+        refined,
+    };
+    Ok(HeldScan { report: done.report(map.as_ref().map(figures), Default::default()), points, shots, map })
+}
+
+/// The points without what the cloud shows to be wrong with them.
+fn refine(
+    points: Vec<CloudPoint>,
+    shots: Shots,
+    format: Format,
+    options: &ScanOptions,
+) -> Result<(Vec<CloudPoint>, Shots, Refined)> {
+    let settings: &Extraction = &options.extraction;
+    let refining = Refining::of(&points, shots, format, settings)?;
+    let places = refining.places;
+    if !refining.changes() {
+        return Ok((points, refining.shots, Refined { places, ..Refined::default() }));
+    }
+    let (mut out, mut spread) = (Vec::with_capacity(points.len()), Spread::default());
+    let sheet = refining.apply(&points, &mut |part| {
+        spread.add(part);
+        out.extend_from_slice(part);
+        Ok(())
+    })?;
+    Ok((out, refining.shots, Refined { places, sheet, median_sigma_mm: spread.median_mm() }))
+}
