@@ -239,14 +239,14 @@ mod tests {
         for (wrong, says) in [
             ("cell://cell3", "no port"),
             ("cell://c:1?fps=3", "unknown option 'fps': rate"),
-            ("play:a?rate=fast", "no number"),
+            ("play:a?rate=fast", "not a number"),
             ("usb0", "names no camera"),
             ("folder:", "names no folder"),
             ("play:?rate=2", "names no folder"),
             ("ffmpeg:-f v4l2", "what ffmpeg is to open"),
             ("folder:a?bits=7", "8 to 16"),
             ("sim:one", "no seed"),
-            ("sim:1?still=here", "no number"),
+            ("sim:1?still=here", "not a number"),
         ] {
             let said = wrong.parse::<CameraUri>().unwrap_err();
             assert!(said.contains(says), "{wrong}: {said}");

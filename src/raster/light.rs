@@ -189,7 +189,7 @@ mod tests {
                 &["upright, 61 px thick, about column 100", "19.1 % saturated"],
             ),
             (told(|_, y| stripe(1.0, 1.0, 200.0)(y)), &["about row 1", "at the picture's border"]),
-            (told(|x, y| if x < 100 && y < 100 { 200.0 } else { 3.0 }), &["no stripe", "(50, 50)"]),
+            (told(|x, y| if x < 100 && y < 100 { 200.0 } else { 3.0 }), &["is not a stripe", "(50, 50)"]),
         ] {
             assert!(wants.iter().all(|w| text.contains(w)), "{text} {wants:?}");
         }

@@ -306,6 +306,6 @@ mod tests {
         assert!(refused(&text.replace("\"mm\"", "\"m\"")).contains("frame and m,"));
         assert!(refused("").contains("line 1"));
         std::fs::remove_file(&path).unwrap();
-        assert!(Shots::load(dir.path(), "base", "rig").unwrap_err().to_string().contains("former version"));
+        assert!(Shots::load(dir.path(), "base", "rig").unwrap_err().to_string().contains("earlier version"));
     }
 }

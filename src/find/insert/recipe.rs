@@ -375,8 +375,8 @@ mod tests {
         let ok = with(dimm, &format!("{least}"), "80").unwrap();
         assert!((ok.insertion.least_above_mm(&ok.drawing()) - least).abs() < 1e-12);
         for (approach, retract, names) in [
-            ("0", "80", "approach_mm is 0,"),
-            ("40", "0", "retract_mm is 0,"),
+            ("0", "80", "approach_mm is 0;"),
+            ("40", "0", "retract_mm is 0;"),
             ("40", "8.84", "retract_mm is 8.84"),
             ("nan", "80", "approach_mm is NaN"),
             ("40", "nan", "retract_mm is NaN"),

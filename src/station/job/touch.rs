@@ -168,11 +168,11 @@ mod tests {
     fn the_document_states_the_numbers_of_a_job() {
         let document = include_str!("../../../docs/robots.md").split_whitespace().collect::<Vec<_>>().join(" ");
         for (says, is) in [
-            ("then eight places around the picture's middle", places::TOUCHES.len() == 8),
-            ("eight more places, half as far apart", super::AGAIN == 0.5),
-            ("without a stripe over a tenth of the picture", lit::LEAST_SHARE == 0.1),
-            ("an eighth of the field's short side to both sides", sweep::ASIDE == 1.0 / 8.0),
-            ("the line sweeps once more, in steps half as long", machine::HALVINGS == 1),
+            ("Then it touches eight points around the picture's middle", places::TOUCHES.len() == 8),
+            ("eight more points are touched, half as far apart", super::AGAIN == 0.5),
+            ("If its stripe covers less than a tenth of the picture", lit::LEAST_SHARE == 0.1),
+            ("an eighth of the field's short side at both ends", sweep::ASIDE == 1.0 / 8.0),
+            ("the line sweeps once more in steps half as long", machine::HALVINGS == 1),
         ] {
             assert!(document.contains(says) && is, "docs/robots.md: {says}");
         }

@@ -205,7 +205,7 @@ mod tests {
         let says = |line: &str| no(&read(line).unwrap_err());
         assert_eq!(
             says("FIND ../led"),
-            "ERROR 1 '../led' is no name of a recipe: 1 to 40 letters, digits, - and _ are"
+            "ERROR 1 '../led' is not a recipe's name: 1 to 40 letters, digits, - and _ are"
         );
         assert_eq!(says("POSE 1 2 nan"), "ERROR 2 'nan' is no number");
         assert!(says("GET / HTTP/1.1").starts_with("ERROR 1 'GET' is no word"));
