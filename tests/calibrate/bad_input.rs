@@ -157,7 +157,7 @@ fn mixed_sizes_and_empty_folders_are_named() {
         std::fs::create_dir(&c.recording).unwrap();
         c.fails(what, &[], &["meta.json"]);
         std::fs::remove_dir(&c.recording).unwrap();
-        c.fails(what, &[], &["no folder"]);
+        c.fails(what, &[], &["not a folder"]);
     }
     let c = Case::new("intrinsics");
     c.keep(&[]);

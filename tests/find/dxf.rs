@@ -219,7 +219,7 @@ fn what_cannot_be_read_is_refused_with_its_reason() {
         (file(MM, "", &entity!("CIRCLE", 8: "0", 10: 0, 20: 0, 40: -1)), "above 0"),
         (file(MM, "", &entity!("CIRCLE", 8: "0", 10: 0, 20: 0, 40: 5, 210: 0.6, 230: 0.8)), "normal"),
         (file(MM, "", &entity!("LINE", 8: "0", 10: 0, 20: 0, 30: 0, 11: 1, 21: 0, 31: 7)), "rises"),
-        (file(MM, "", &entity!("CIRCLE", 8: "0", 10: "nan", 20: 0, 40: 5)), "no usable number"),
+        (file(MM, "", &entity!("CIRCLE", 8: "0", 10: "nan", 20: 0, 40: 5)), "not a usable number"),
         (file(MM, "", &entity!("INSERT", 8: "0", 2: "A", 10: 0, 20: 0, 70: 30000, 71: 30000)), "not a block"),
         (file(MM, "", &entity!("LWPOLYLINE", 8: "0", 90: 9, 70: 1, 10: 0, 20: 0)), "9 are announced"),
         (file(MM, "", &ring).replace("0\nEOF\n", ""), "cut off"),

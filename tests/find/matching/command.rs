@@ -91,7 +91,7 @@ fn what_cannot_be_searched_is_refused() {
     let refused: [(&[&str], &str); 6] = [
         (&["--template-region", "300,0,100,100"], "does not lie in"),
         (&["--template-region", "2,2,20,20"], "edge places"),
-        (&["--region", "5000,0,10,10"], "beside the picture"),
+        (&["--region", "5000,0,10,10"], "outside the picture"),
         (&["--polygon", "0,0,5,5"], "corners"),
         (&["--angles", "5..-5"], "angles_deg"),
         (&["--out", text(&part)], "would replace"),
