@@ -25,8 +25,8 @@ fn done(what: &str, command: &mut Command) -> Output {
     out
 }
 
-/// Without what cargo tells the programs that it runs: build scripts ask for some of it (ring's does), and would run again
-/// because this test has it and the build before had not.
+/// Without the variables that cargo sets for the programs that it runs: build scripts read some of them (ring's does),
+/// and would run again because this test has them and the build before had not.
 fn as_by_hand(command: &mut Command) -> &mut Command {
     let told = ["CARGO_PKG_", "CARGO_MANIFEST_", "CARGO_BIN_", "CARGO_CRATE_", "CARGO_PRIMARY_", "CARGO_TARGET_TMPDIR"];
     for (name, _) in std::env::vars_os() {

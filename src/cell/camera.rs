@@ -1,5 +1,5 @@
-//! The pictures that the cell's cameras take: that of the sensor, and the small one in the gripper. Levels of the sensor's
-//! depth, exposures in us. A picture shows the middle of its exposure, unmoved.
+//! The pictures of the cell's cameras: that of the sensor, and the small one in the gripper. Levels have the sensor's
+//! depth, exposures are in us. A picture shows the middle of its exposure, unmoved.
 
 use crate::geometry::{Camera, Flange, Rigid, Vec3};
 use crate::raster::Image;

@@ -266,7 +266,7 @@ impl Cell {
         Ok(())
     }
 
-    /// A person moves the arm with the pendant until the sensor looks at the part that the gripper's component belongs to.
+    /// A person moves the arm with the pendant until the sensor looks at the part of the gripper's component.
     /// The arm stays where the gripper holds nothing, and where the sensor stands still.
     ///
     /// # Errors

@@ -48,7 +48,7 @@ impl Calibration<Intrinsics> {
     /// The camera of pictures that show the calibrated view at another resolution.
     fn rescaled(&self, [w, h]: [u32; 2], stated: &Readout) -> Result<Intrinsics> {
         if *stated != (Readout { same_view: true, ..Readout::default() }) {
-            return Err(Fault::input(format!("the pictures are said to be two things at once: {stated}"))
+            return Err(Fault::input(format!("the readout contradicts itself: {stated}"))
                 .cause("a region, binning or mirroring changes the view")
                 .next("state 'same_view' alone, or the other keys of 'readout' without it"));
         }
@@ -156,7 +156,7 @@ mod tests {
         assert_eq!(camera.for_pictures([640, 480], Some(&word)).unwrap(), camera.value);
         assert!(camera.for_pictures([4096, 3000], Some(&word)).unwrap_err().cause.contains("3072"));
         let both = Readout { same_view: true, ..region(5, 5) };
-        assert!(camera.for_pictures([320, 240], Some(&both)).unwrap_err().what.contains("two things"));
+        assert!(camera.for_pictures([320, 240], Some(&both)).unwrap_err().what.contains("contradicts itself"));
     }
 
     #[test]

@@ -137,7 +137,8 @@ pub fn find_part(
     Ok((report, image))
 }
 
-/// Finds the recipe's part in a scan in memory; `rig` is the one that scanned. Without it the budget lacks the calibrations.
+/// Finds the recipe's part in a scan in memory; `rig` is the one that scanned. Without it the budget lacks the
+/// calibrations.
 pub fn find_part_held(
     held: &HeldScan,
     recipe: &Recipe,

@@ -196,7 +196,7 @@ fn whatever_comes_over_the_socket_gets_one_clear_line() {
     says("POSE 300,0 590 180 0 180", "OK 1");
     says("POSE 0.3 0 0.59 3.14 0 3.14", "ERROR 2 the flange would be 0.662 mm from its base");
     says("POSE 1e9 0 590 180 0 180", "ERROR 2 ");
-    says("GET / HTTP/1.1", "ERROR 1 'GET' is no word");
+    says("GET / HTTP/1.1", "ERROR 1 'GET' is not a word");
     let mut rng = rand_pcg::Pcg64::seed_from_u64(5);
     for _ in 0..300 {
         // An end within it would make two lines of it, and an empty one is passed over.

@@ -358,7 +358,7 @@ fn what_is_not_shown_is_passed_over_with_its_reason() {
         (1, "CIRCLE on layer Defpoints, which is never plotted"),
         (1, "ARC of radius 0"),
     ] {
-        assert!(read.notes.contains(&format!("passed over: {count} {words}")), "{words}: {:?}", read.notes);
+        assert!(read.notes.contains(&format!("skipped: {count} {words}")), "{words}: {:?}", read.notes);
     }
     for words in
         ["1 edges are drawn as CENTER", "1 polylines have a width", "1 inserted blocks are shown in part", "3 lines"]

@@ -71,15 +71,15 @@ pub fn before(pairs: &[Pair], mount: Mount, o: &HandEyeOptions) -> Result<()> {
 /// Below this share of chance no other order of the poses is looked for.
 const SURELY: f64 = 0.02;
 
-/// Refuses a fit that is no better than chance, that few pairs agree with, or that another notation, unit or order of the poses
-/// would make much better. Returns what would make the pairs fit that were left out.
+/// Refuses a fit that is no better than chance, that few pairs agree with, or that another notation, unit or order of
+/// the poses would make much better. Returns what would make the excluded pairs fit.
 pub fn after(pairs: &[Pair], fit: &HandEyeFit, mount: Mount, o: &HandEyeOptions) -> Result<Option<String>> {
     let chosen: Vec<&Pair> = pairs.iter().zip(&fit.pairs).filter(|(_, r)| r.used).map(|(p, _)| p).collect();
     let used = chosen.len();
     let chance = chance(&chosen, o.seed);
     let what = format!(
-        "pictures and robot poses do not belong together: {used} of {} pairs agree, the robot would scatter by {:.2} mm and \
-         {:.3} degrees; their misfit is {:.0} % of that of poses dealt out at random (limit {:.0} %)",
+        "pictures and robot poses do not belong together: {used} of {} pairs agree, the robot would scatter by \
+         {:.2} mm and {:.3} degrees; their misfit is {:.0} % of that of poses dealt out at random (limit {:.0} %)",
         pairs.len(),
         fit.noise.robot_mm,
         fit.noise.robot_rad.to_degrees(),

@@ -1,5 +1,5 @@
-//! Answers whoever looks at a camera of the cell, and sends its pictures (`capture::wire` has the protocol). Times in ns of
-//! the cell's clock.
+//! Answers the viewers of the cell's cameras and sends their pictures (`capture::wire` has the protocol). Times are in
+//! ns of the cell's clock.
 
 use super::Faults;
 use crate::capture::wire::{Message, Sent, write};

@@ -13,9 +13,8 @@ pub struct ReadoutArgs {
     /// Binning of the pictures in both directions, if neither camera nor meta.json states it
     #[arg(long, hide_short_help = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     binned: Option<u32>,
-    /// Pictures of another size show the same view as those of the calibration, at another resolution; only where
-    /// neither camera nor meta.json says what they show
-    #[arg(long, conflicts_with_all = ["region", "binned"])]
+    /// The pictures show the calibration's view at another resolution, if neither camera nor meta.json states it
+    #[arg(long, hide_short_help = true, conflicts_with_all = ["region", "binned"])]
     same_view: bool,
 }
 

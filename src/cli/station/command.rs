@@ -137,8 +137,8 @@ pub struct Export {
     /// File for the values (JSON), or for the camera alone (YAML, XML, JSON)
     #[arg(long)]
     out: PathBuf,
-    /// For whom: values (this program, all that the station has), opencv (the camera, by --out's extension .yaml, .xml or .json),
-    /// ros (camera_info) or kalibr
+    /// Format: values (all of the station, for import), or the camera for opencv, ros (camera_info) or kalibr; for
+    /// opencv the extension of --out is .yaml, .xml or .json
     #[arg(long = "as", default_value = "values", value_parser = crate::cli::terminal::arguments::parse::<ValuesFormat>)]
     format: ValuesFormat,
 }

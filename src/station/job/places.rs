@@ -5,8 +5,9 @@
 
 use crate::geometry::{Base, Camera, Flange, Plane, Ray, Rigid, Vec2, Vec3};
 
-/// Touches lie at these shares of the field around its middle, on eight sides: where one side of the picture lies beside the board,
-/// or a part fills it, six are left on the board, and no other plane has more than four (two rows of three would have six).
+/// Touches lie at these shares of the field around its middle, on eight sides: where one side of the picture lies
+/// beside the board, or a part fills it, six are left on the board, and no other plane has more than four (two rows
+/// of three would have six).
 pub(super) const TOUCHES: [[f64; 2]; 8] =
     [[-1.0, -0.5], [-0.5, -1.0], [0.5, -1.0], [1.0, -0.5], [1.0, 0.5], [0.5, 1.0], [-0.5, 1.0], [-1.0, 0.5]];
 

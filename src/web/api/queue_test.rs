@@ -87,7 +87,7 @@ fn taking_over_and_letting_go_wait_for_no_other_work() {
         screen.desk.is_armed(guard, &tab("a"));
         assert_eq!(screen.desk.state().armed.as_deref(), Some("a"));
         take("b").await;
-        assert_eq!(screen.desk.state().armed, None, "the former operator's button still moves the robot");
+        assert_eq!(screen.desk.state().armed, None, "the previous operator's button still moves the robot");
         assert!(session::release(State(screen.clone()), Extension(tab("b"))).await.is_ok());
         assert_eq!(screen.leases.state().holder, None);
     });

@@ -1,5 +1,5 @@
-//! By which names a browser may call this server: the headers Host and Origin, read as a name or an address with perhaps
-//! a port, and compared as that.
+//! The names by which a browser may call this server: the headers Host and Origin, read as a name or an address with
+//! or without a port, and compared as that.
 
 use crate::fault::{Fault, Result};
 use axum::http::uri;

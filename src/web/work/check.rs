@@ -1,5 +1,5 @@
-//! Checks the station and this machine, a line each. The GPU's stages run in a process of their own, because a driver can
-//! end it.
+//! Checks the station and this machine, a line each. The GPU's stages run in a process of their own, because a driver
+//! can end it.
 
 use super::run::Run;
 use crate::camera::{Intrinsics, Readout};

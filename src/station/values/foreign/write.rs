@@ -76,7 +76,8 @@ fn opencv_xml(k: &Intrinsics) -> String {
         )
     };
     format!(
-        "<?xml version=\"1.0\"?>\n<opencv_storage>\n<image_width>{}</image_width>\n<image_height>{}</image_height>\n{}{}</opencv_storage>\n",
+        "<?xml version=\"1.0\"?>\n<opencv_storage>\n<image_width>{}</image_width>\n\
+         <image_height>{}</image_height>\n{}{}</opencv_storage>\n",
         k.width,
         k.height,
         part("camera_matrix", 3, &matrix),
