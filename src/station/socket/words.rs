@@ -207,7 +207,7 @@ mod tests {
             says("FIND ../led"),
             "ERROR 1 '../led' is not a recipe's name: 1 to 40 letters, digits, - and _ are"
         );
-        assert_eq!(says("POSE 1 2 nan"), "ERROR 2 'nan' is no number");
+        assert_eq!(says("POSE 1 2 nan"), "ERROR 2 'nan' is not a number");
         assert!(says("GET / HTTP/1.1").starts_with("ERROR 1 'GET' is not a word"));
         assert!(says("SCAN now").contains("stands alone") && says("GIVE up").contains("not 'up'"));
         assert!(says("\u{8d64}\u{7}").starts_with("ERROR 1 '??' is not a word"));
