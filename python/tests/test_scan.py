@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import signal
 import threading
 import time
 
@@ -152,6 +153,8 @@ def test_what_progress_raises_ends_the_scan(recording, station, tmp_path):
 
 
 def test_ctrl_c_ends_a_scan(recording, station):
+    # Python ignores Ctrl-C where it was started in the background.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     begun = threading.Event()
 
     def slow(done: int, all: int | None) -> None:
@@ -165,8 +168,11 @@ def test_ctrl_c_ends_a_scan(recording, station):
     presser = threading.Thread(target=press)
     presser.start()
     started = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
-        sheetlight.scan(recording, station, progress=slow)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            sheetlight.scan(recording, station, progress=slow)
+    finally:
+        signal.signal(signal.SIGINT, before)
     presser.join()
     assert time.monotonic() - started < 0.05 * 120
 

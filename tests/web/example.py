@@ -18,6 +18,6 @@ try:
     wrong = run(s.url, "scna", "led")
     assert wrong.returncode != 0 and "scna" in wrong.stderr, wrong.stderr
     stale = run(s.url[:-4] + "0000", "scan", "led")
-    assert stale.returncode != 0 and "session" in stale.stderr, stale.stderr
+    assert stale.returncode != 0 and "not signed in" in stale.stderr, stale.stderr
 finally:
     s.end()
