@@ -4,8 +4,6 @@
 
 mod answer;
 mod camera;
-#[cfg(test)]
-mod documented;
 mod jobs;
 mod motion;
 mod openapi;
@@ -17,9 +15,8 @@ mod settings;
 mod support;
 mod surface;
 mod sweep;
+#[cfg(test)]
+mod tests;
 
 pub use openapi::openapi;
 pub use router::router;
-
-#[cfg(test)]
-mod queue_test;

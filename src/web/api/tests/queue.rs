@@ -1,7 +1,7 @@
 //! What halts acts in its request's own thread: every thread for work that takes long sleeps here and never wakes.
 
-use super::{jobs, motion, session};
 use crate::arm::rules::{Carried, Guard, MotionLog};
+use crate::web::api::{jobs, motion, session};
 use crate::web::event::Hub;
 use crate::web::guard::{Sessions, Tab};
 use crate::web::message::{JobState, Mode, Order, Plain};

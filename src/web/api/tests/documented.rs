@@ -1,8 +1,8 @@
 //! Whether docs/api.md and docs/operator.md state the numbers that the screen keeps.
 
-use super::camera;
 use crate::capture::PIECES;
 use crate::station::LIT;
+use crate::web::api::camera;
 use crate::web::camera::FRESH;
 use crate::web::guard::{IDLE, MOST_BODY};
 use crate::web::motion::{HELD, LONGEST, SILENCE};
@@ -29,7 +29,7 @@ fn says(name: &str, document: &str, all: &[String]) {
 fn the_api_is_described_with_the_numbers_that_it_keeps() {
     says(
         "docs/api.md",
-        include_str!("../../../docs/api.md"),
+        include_str!("../../../../docs/api.md"),
         &[
             format!("It expires after {} s without a request", IDLE.as_secs()),
             format!("redeems it once, {} to {} s later", HELD.as_secs_f64(), LONGEST.as_secs_f64()),
@@ -47,7 +47,7 @@ fn the_api_is_described_with_the_numbers_that_it_keeps() {
 fn operators_are_told_the_numbers_that_the_screen_keeps() {
     says(
         "docs/operator.md",
-        include_str!("../../../docs/operator.md"),
+        include_str!("../../../../docs/operator.md"),
         &[
             format!("After {} without a touch it is released", spoken(IDLE)),
             format!("Hold the button for {}", spoken(HELD)),
