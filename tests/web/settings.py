@@ -116,7 +116,7 @@ def outputs(s, b, events):
 
     stalls.again("the line", lit, seen_anew)
     b.click("[data-output=open]")
-    b.until("the question", "return document.querySelector('[data-output=open]').innerText.includes('falls')")
+    b.until("the question", "return document.querySelector('[data-output=open]').innerText.includes('drop')")
 
     def switched():
         """How the line changed; the other laser stays off. Both are switched off once more before and after a try."""

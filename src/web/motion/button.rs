@@ -105,7 +105,7 @@ impl Desk {
     pub(super) fn ask(&self, asked: Asked, stop: &AtomicBool) -> Answer {
         let until = Instant::now() + Duration::from_secs_f64(asked.within_s);
         let mut at = self.at();
-        at.robot = Robot::Job(Step::Shown(asked));
+        at.robot = Robot::Job(Step::Shown(Box::new(asked)));
         self.tell(&at);
         let answer = loop {
             if stop.load(Ordering::SeqCst) {

@@ -24,11 +24,11 @@ pub(super) enum Step {
     /// No motion is shown.
     Works,
     /// A motion is shown, and nobody has answered.
-    Shown(Asked),
+    Shown(Box<Asked>),
     /// It was refused; the job does not know yet.
-    Refused(Asked),
+    Refused(Box<Asked>),
     /// It was confirmed, and is made.
-    Moves(Asked),
+    Moves(Box<Asked>),
 }
 
 /// A button that is down. It may stay down from one motion to the next.
@@ -61,7 +61,7 @@ impl At {
     /// The motion that is shown, or made.
     pub fn asked(&self) -> Option<&Asked> {
         match &self.robot {
-            Robot::Job(Step::Shown(asked) | Step::Refused(asked) | Step::Moves(asked)) => Some(asked),
+            Robot::Job(Step::Shown(asked) | Step::Refused(asked) | Step::Moves(asked)) => Some(asked.as_ref()),
             _ => None,
         }
     }
@@ -75,7 +75,7 @@ impl At {
     }
 
     /// The motion that waits for an answer becomes something else.
-    pub fn answer(&mut self, with: impl FnOnce(Asked) -> Step) {
+    pub fn answer(&mut self, with: impl FnOnce(Box<Asked>) -> Step) {
         self.robot = match std::mem::take(&mut self.robot) {
             Robot::Job(Step::Shown(asked)) => Robot::Job(with(asked)),
             other => other,
