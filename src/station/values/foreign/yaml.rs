@@ -145,7 +145,12 @@ fn flow_value(at: &mut &str, depth: usize) -> Option<Value> {
             *at = rest;
             map.insert(key.trim().trim_matches(['"', '\'']).to_owned(), flow_value(at, depth + 1)?);
         } else {
+            let before = at.len();
             items.push(flow_value(at, depth + 1)?);
+            // A bracket of the other kind, or nothing before a comma: no item, and no end of the list either.
+            if at.len() == before {
+                return None;
+            }
         }
         *at = at.trim_start();
         *at = at.strip_prefix(',').unwrap_or(at);
@@ -174,7 +179,7 @@ mod tests {
         });
         assert_eq!(parse(text).unwrap(), wanted);
         assert_eq!(parse("a: {b: 1, c: [2, 3]}").unwrap(), json!({ "a": { "b": 1.0, "c": [2.0, 3.0] } }));
-        for bad in ["no key here", "a: [1, 2", "a: 1\n  b: 2"] {
+        for bad in ["no key here", "a: [1, 2", "a: [1}", "a: [[}", "a: [,]", "a: {b: [1}}", "a: 1\n  b: 2"] {
             assert!(parse(bad).is_err(), "{bad}");
         }
     }
