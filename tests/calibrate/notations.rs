@@ -27,7 +27,7 @@ struct Set {
 /// Both mounts, 8 to 20 poses, robots and cameras of four qualities.
 fn set(seed: u64) -> Set {
     let mut rng = Pcg64::seed_from_u64(48_000 + seed);
-    let mount = if seed % 3 == 0 { Mount::EyeToHand } else { Mount::EyeInHand };
+    let mount = if seed.is_multiple_of(3) { Mount::EyeToHand } else { Mount::EyeInHand };
     let count = rng.random_range(8..=20);
     let station = station(&mut rng, mount, count);
     let right = pairs(&mut rng, &station, LEVELS[seed as usize % LEVELS.len()], &station.camera);
