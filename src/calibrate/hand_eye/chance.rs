@@ -3,7 +3,7 @@
 use super::closed::{Pair, park_martin};
 use rand::{SeedableRng, seq::SliceRandom};
 
-/// Poses dealt out at random fit a chain too, badly. Pairs whose misfit is above this share of the best of [`DEALS`]
+/// Poses dealt out at random fit a chain too, badly. Pairs whose misfit is above this share of the best of `DEALS`
 /// random deals fit by chance: 1200 shuffled sets of 6 to 25 pairs come out at 0.56 and more, robots that scatter by 2
 /// mm and 1 degree at 0.33 and less, and once of 1200 more at 0.47 (tests/calibrate/hand_eye_judge.rs, its long form).
 pub const BY_CHANCE: f64 = 0.5;
