@@ -56,7 +56,8 @@ browser:
 cameras:
 	tools/cameras.sh
 
-# The scorer of the reference data and the comparisons need numpy, scipy and libigl; the Python package maturin, mypy and pytest.
+# The scorer of the reference data and the comparisons need numpy, scipy and libigl. The Python package needs maturin,
+# mypy and pytest.
 python:
 	tools/python-env.sh $(VENV) test
 

@@ -1,6 +1,6 @@
-//! In: simulated pictures of every scene. Out: the chain of a scan, which learns the stripe from its first pictures,
-//! over the chain that `sheetlight bench` and the peers time, which is told it: points, wall and CPU time of both, in
-//! turns, on the processor and on the GPU. Frame and unit: ms a shot, shares.
+//! Compares the chain of a scan with the chain that `sheetlight bench` and the peers time, on simulated pictures of
+//! every scene: points, wall and CPU time (ms a shot), in turns, on the processor and on the GPU. A scan learns the
+//! stripe from its first pictures; the other chain gets its width.
 //! `cargo bench --bench scan_chain -- [WIDTHxHEIGHT]... [ROUNDS]`
 
 mod common;

@@ -96,8 +96,10 @@ def threshold_alone(image):
 
 @numba.njit(cache=True)
 def centroid(image, least):
-    """Centre of the light around the brightest row of each column; 0 where nothing is bright. It goes row by row and without
-    branches, so that numba makes vector instructions of it, and on one thread: more threads cost more CPU time here."""
+    """Centre of the light around the brightest row of each column; 0 where nothing is bright.
+
+    It goes row by row and without branches, so that numba makes vector instructions of it. It uses one thread: more
+    threads take more CPU time here."""
     height, width = image.shape
     best = np.zeros(width, np.uint8)
     at = np.zeros(width, np.uint16)
@@ -165,7 +167,9 @@ class Sheetlight:
         self.pipe = subprocess.Popen([program, "bench", "--peer-pipe"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         setup = dict(width=width, height=height, count=len(images), shots_per_batch=batch, size=SIZE, offset=OFFSET,
                      pinhole=[k[0, 0], k[1, 1], k[0, 2], k[1, 2], 0.0], distortion=list(LENS),
-                     normal=list(NORMAL), offset_mm=DISTANCE, width_px=width_px)  # None: it learns the width
+                     normal=list(NORMAL), offset_mm=DISTANCE,
+                     # None: it learns the width.
+                     width_px=width_px)
         self.pipe.stdin.write(json.dumps(setup).encode() + b"\n")
         for image in images:
             self.pipe.stdin.write(image.tobytes())

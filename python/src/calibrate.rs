@@ -34,9 +34,9 @@ fn recorded(object: &Bound<'_, PyAny>) -> PyResult<Recording> {
 /// together.
 ///
 /// `lens` is evidence (what the pictures determine), none, one, four, five, rational, prism, scheimpflug or all;
-/// `board` is evidence, drawn or shaped; the expected error is stated at `working_mm`. `progress(done, all)` is told
-/// of pictures; Ctrl-C ends it where it is done. Raises SheetlightError for recordings without boards, or of two
-/// sizes.
+/// `board` is evidence, drawn or shaped. The expected error is stated at the distance `working_mm`. `progress(done, all)`
+/// is called with the number of pictures. Ctrl-C takes effect when the calibration has ended. Raises SheetlightError
+/// for recordings without boards and for pictures of two sizes.
 #[pyfunction]
 #[pyo3(signature = (recordings, *, lens = "evidence", skew = false, board = "evidence", working_mm = None,
     progress = None))]

@@ -4,12 +4,12 @@ const MOST: usize = 120;
 
 /// Files that still have longer lines, with their number. The numbers may only fall.
 const STILL_LONG: [(&str, usize); 41] = [
-    ("CHANGELOG.md", 112),
+    ("CHANGELOG.md", 104),
     ("src/station/judge/viewer.js", 1),
     ("src/web/pages/base/api.js", 10),
     ("src/web/pages/base/app.js", 5),
     ("src/web/pages/base/store.js", 1),
-    ("src/web/pages/base/texts.js", 68),
+    ("src/web/pages/base/texts.js", 66),
     ("src/web/pages/pages/calibrate.js", 23),
     ("src/web/pages/pages/health.js", 19),
     ("src/web/pages/pages/part.js", 34),
