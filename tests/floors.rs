@@ -123,6 +123,7 @@ const HOMES: &[(&str, &str)] = &[
     ("rpassword", "cli"),
     ("rs_opw_kinematics", "cell"),
     ("rust_embed", "web"),
+    ("saphyr_parser", "station"),
     ("signal_hook", "cli"),
     ("tiff", "raster"),
     ("tokio", "web"),
