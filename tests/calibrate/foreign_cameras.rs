@@ -36,6 +36,10 @@ fn values_and_conventions_are_those_of_the_programs() {
     // ROS prints eight digits.
     assert_eq!(ros, Intrinsics { fx: 612.34568, ..truth(&[-0.21, 0.07, 3e-4, -7.3e-5, 0.01]) });
     assert!(said.contains("ROS"), "{said}");
+    // A message as `ros2 topic echo` prints it, of a driver that bins.
+    let (message, said) = read("ros2_echo.yaml");
+    assert_eq!(message, truth(&five));
+    assert!(said.contains("ROS") && said.contains("binning 2 x 2 in it is the driver's"), "{said}");
     let (kalibr, said) = read("kalibr.yaml");
     assert_eq!(kalibr, truth(&five[..4]));
     assert!(said.contains("Kalibr"), "{said}");

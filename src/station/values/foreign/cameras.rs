@@ -7,9 +7,9 @@ use crate::fault::{Fault, Result};
 use serde_json::Value;
 
 /// Names under which programs keep the same thing.
-const MATRIX: [&str; 7] =
-    ["camera_matrix", "Camera_Matrix", "cameraMatrix", "CameraMatrix", "intrinsic_matrix", "K", "M1"];
-const LENS: [&str; 9] = [
+const MATRIX: [&str; 8] =
+    ["camera_matrix", "Camera_Matrix", "cameraMatrix", "CameraMatrix", "intrinsic_matrix", "K", "M1", "k"];
+const LENS: [&str; 10] = [
     "distortion_coefficients",
     "Distortion_Coefficients",
     "distortion_coeffs",
@@ -19,6 +19,7 @@ const LENS: [&str; 9] = [
     "dist",
     "D",
     "D1",
+    "d",
 ];
 const WIDTH: [&str; 3] = ["image_width", "image_Width", "width"];
 const HEIGHT: [&str; 3] = ["image_height", "image_Height", "height"];
@@ -30,7 +31,12 @@ pub fn camera(text: &str) -> Result<Option<(Intrinsics, String)>> {
     if halcon::is_one(text) {
         return halcon::camera(text).map(Some);
     }
-    let Ok(file) = tree::read(text) else { return Ok(None) };
+    let file = match tree::read(text) {
+        Ok(file) => file,
+        // Values of this program's own are JSON; who reads them says what is wrong with them.
+        Err(_) if text.trim_start_matches('\u{feff}').trim_start().starts_with('{') => return Ok(None),
+        Err(fault) => return Err(fault),
+    };
     let Value::Object(map) = &file else { return Ok(None) };
     if map.contains_key("FocalLength") || map.contains_key("IntrinsicMatrix") {
         return matlab(&file).map(Some);
@@ -134,8 +140,29 @@ fn opencv(file: &Value) -> Result<(Intrinsics, String)> {
     let said = format!(
         "read as {by} writes it: {} lens terms k1 k2 p1 p2 k3 ..., (0, 0) is the centre of a pixel",
         terms.len()
-    );
+    ) + &driver(file).map_or(String::new(), |d| {
+        format!(
+            "; {d} in it is the driver's, the matrix is of the whole sensor: state it as 'readout' of such pictures"
+        )
+    });
     Ok((from_matrix(&matrix, distortion, size(file)?)?, said))
+}
+
+/// What a camera_info message says of the pictures that its driver sends now. Its matrix and its size are those of the
+/// whole sensor whatever these are (sensor_msgs/CameraInfo, "operational parameters"); 0 stands for "not used".
+fn driver(file: &Value) -> Option<String> {
+    let number = |v: &Value, key: &str| v.get(key).and_then(Value::as_f64).unwrap_or(0.0);
+    let binned = ["binning_x", "binning_y"].map(|key| number(file, key).max(1.0));
+    let roi = file.get("roi").unwrap_or(&Value::Null);
+    let region = ["x_offset", "y_offset", "width", "height"].map(|key| number(roi, key));
+    let mut said = Vec::new();
+    if binned != [1.0; 2] {
+        said.push(format!("binning {} x {}", binned[0], binned[1]));
+    }
+    if region != [0.0; 4] {
+        said.push(format!("region {:?}", region));
+    }
+    (!said.is_empty()).then(|| said.join(", "))
 }
 
 fn another_lens(model: &str) -> Fault {

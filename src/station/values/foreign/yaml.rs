@@ -56,6 +56,8 @@ pub fn parse(text: &str) -> Result<Value> {
                 }
             },
             None if whole.is_none() => whole = Some(value),
+            // `ros2 topic echo` ends each message with '---'.
+            None if value.is_null() => {}
             None => return Err(unread(line, "a second document")),
         }
     }
