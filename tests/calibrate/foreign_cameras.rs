@@ -39,7 +39,7 @@ fn values_and_conventions_are_those_of_the_programs() {
     // A message as `ros2 topic echo` prints it, of a driver that bins.
     let (message, said) = read("ros2_echo.yaml");
     assert_eq!(message, truth(&five));
-    assert!(said.contains("ROS") && said.contains("binning 2 x 2 in it is the driver's"), "{said}");
+    assert!(said.contains("ROS") && said.contains("its binning 2 x 2 belongs to the driver"), "{said}");
     let (kalibr, said) = read("kalibr.yaml");
     assert_eq!(kalibr, truth(&five[..4]));
     assert!(said.contains("Kalibr"), "{said}");

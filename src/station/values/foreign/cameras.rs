@@ -141,9 +141,7 @@ fn opencv(file: &Value) -> Result<(Intrinsics, String)> {
         "read as {by} writes it: {} lens terms k1 k2 p1 p2 k3 ..., (0, 0) is the centre of a pixel",
         terms.len()
     ) + &driver(file).map_or(String::new(), |d| {
-        format!(
-            "; {d} in it is the driver's, the matrix is of the whole sensor: state it as 'readout' of such pictures"
-        )
+        format!("; its {d} belongs to the driver, not to the matrix: state it as 'readout' in meta.json")
     });
     Ok((from_matrix(&matrix, distortion, size(file)?)?, said))
 }
@@ -160,7 +158,7 @@ fn driver(file: &Value) -> Option<String> {
         said.push(format!("binning {} x {}", binned[0], binned[1]));
     }
     if region != [0.0; 4] {
-        said.push(format!("region {:?}", region));
+        said.push(format!("region {region:?}"));
     }
     (!said.is_empty()).then(|| said.join(", "))
 }
