@@ -125,10 +125,8 @@ fn guess(profile: Profile) -> vec2<f32> {
 
 fn finish(at: vec2<i32>, n: vec2<f32>, m: f32, amplitude: f32, width: f32, sigma: f32, full: bool) -> Peak {
     var peak: Peak;
-    // Along the image axis that the profile was taken on: on the line, however the direction errs.
-    let columns = by_columns(n);
-    peak.u = f32(at.x) + select(m / n.x, 0.0, columns);
-    peak.v = f32(at.y) + select(0.0, m / n.y, columns);
+    peak.u = f32(at.x) + m * n.x;
+    peak.v = f32(at.y) + m * n.y;
     peak.normal_u = n.x;
     peak.normal_v = n.y;
     peak.amplitude = amplitude;
@@ -168,6 +166,8 @@ fn exponential(x: vec2<f32>) -> vec2<f32> {
 var<private> model: vec2<f32>;
 var<private> ratio: vec2<f32>;
 var<private> fall: f32;
+// One over the model's width.
+var<private> narrow: f32;
 var<private> z: vec2<f32>;
 var<private> dz: vec2<f32>;
 // Variance without light, what light adds to it, the model's light at full scale.
@@ -194,7 +194,11 @@ fn fit_pair(j: i32) {
         let above = clamp(soft * (model - vec2(ceiling)) + vec2(0.5), vec2(0.0), vec2(1.0));
         let silent = above * lost[j];
         let heard = max(vec2(1.0) - silent, vec2(1e-3));
-        let residual = (light[j] - model) + silent * (model - vec2(ceiling));
+        // The model of a sample that is off the others' steps or wider, to second order.
+        let stray = stray_pair(j);
+        let there = model * ((vec2(1.0) - z * (stray * narrow)) + (z * z - vec2(1.0)) * (spread_pair(j, stray)
+            * (0.5 * (narrow * narrow))));
+        let residual = (light[j] - there) + silent * (model - vec2(ceiling));
         let inverse = with_all[j] / (heard * (quiet + model * (gain + speckle2 * model)));
         let certainty = (heard * heard) * inverse;
         let pull = (heard * inverse) * residual;
@@ -248,6 +252,7 @@ fn gaussian(at: vec2<i32>) -> Peak {
     var left = frame.steps;
     while left > 0u {
         let inverse = 1.0 / width;
+        narrow = inverse;
         let wide = profile.step * inverse;
         let z0 = (profile.offset - m) * inverse;
         z = vec2(z0, z0 - wide);

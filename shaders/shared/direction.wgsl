@@ -24,9 +24,12 @@ const TWO = 36;
 const FAR = 16;
 const NONE = 64;
 
+// How much the rig's direction counts where the gradients agree as badly as those of a straight stripe.
+const DISUNITED = 0.04;
+
 // The structure tensor from 13 gradients on 24 grey levels, every other place of a lattice, in whole numbers: half
-// the difference of its diagonal, the other element, half the difference of its eigenvalues.
-fn tensor(x: i32, y: i32, u: i32, v: i32) -> vec3<f32> {
+// the difference of its diagonal, the other element, half the difference of its eigenvalues and half their sum.
+fn tensor(x: i32, y: i32, u: i32, v: i32) -> vec4<f32> {
     let a = vec3(whole(x - 2 * u, y - 3 * v), whole(x, y - 3 * v), whole(x + 2 * u, y - 3 * v));
     let b = vec4(whole(x - 3 * u, y - 2 * v), whole(x - u, y - 2 * v), whole(x + u, y - 2 * v), whole(x + 3 * u,
         y - 2 * v));
@@ -55,13 +58,15 @@ fn tensor(x: i32, y: i32, u: i32, v: i32) -> vec3<f32> {
     let sxy = (dot(far, ax * ay) + dot(far, bx * wy)) + (dot(row, rx * ry) + ONE * dot(dx, dy));
     let syy = (dot(far, ay * ay) + dot(far, wy * wy)) + (dot(row, ry * ry) + ONE * dot(dy, dy));
     let ratio = f32(v) / f32(u);
-    let h = 0.5 * ((ratio * ratio) * f32(sxx) - f32(syy));
+    let xx = (ratio * ratio) * f32(sxx);
+    let yy = f32(syy);
+    let h = 0.5 * (xx - yy);
     let xy = ratio * f32(sxy);
-    return vec3(h, xy, sqrt(h * h + xy * xy));
+    return vec4(h, xy, sqrt(h * h + xy * xy), 0.5 * (xx + yy));
 }
 
 // Sine and cosine of twice the angle that a tensor shows.
-fn twice(t: vec3<f32>) -> vec2<f32> {
+fn twice(t: vec4<f32>) -> vec2<f32> {
     return vec2(t.y, -t.x) / vec2(max(t.z, 1e-12));
 }
 
@@ -88,9 +93,19 @@ fn direction_at(x: i32, y: i32) -> vec2<f32> {
     let q = t.z;
     let m = select(vec2(xy, q - h), vec2(h + q, xy), h > 0.0);
     let n = vec2(m.x + turn * m.y, m.y - turn * m.x);
-    let length = sqrt(n.x * n.x + n.y * n.y);
-    let sign = select(1.0, -1.0, n.y < 0.0);
-    return select(vec2(sign * n.x / length, sign * n.y / length), vec2(0.0, 1.0), sqrt(m.x * m.x + m.y * m.y) < 1e-9);
+    // Twice the angle: what the gradients say, and the rig, the more of it the less they agree.
+    let other = (t.w - q) / (frame.ragged * (t.w + q) + frame.restless);
+    let own = 2.0 * q / (t.w + q) / (n.x * n.x + n.y * n.y);
+    let rig = DISUNITED * (other * other);
+    let across = vec2(frame.across_u, frame.across_v);
+    let sine = own * (2.0 * n.x * n.y) + rig * (2.0 * across.x * across.y);
+    let cosine = own * (n.y * n.y - n.x * n.x) + rig * (across.y * across.y - across.x * across.x);
+    let both = sqrt(sine * sine + cosine * cosine);
+    let told = select(vec2(both - cosine, sine), vec2(sine, cosine + both), cosine > 0.0);
+    let length = sqrt(told.x * told.x + told.y * told.y);
+    let sign = select(1.0, -1.0, told.y < 0.0);
+    let dark = sqrt(m.x * m.x + m.y * m.y) < 1e-9;
+    return select(vec2(sign * told.x / length, sign * told.y / length), vec2(0.0, 1.0), dark);
 }
 
 // The next place along the stripe whose differences lie in the picture.

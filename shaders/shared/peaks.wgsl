@@ -12,7 +12,7 @@ struct PeakFrame {
     speckle2: f32,
     belief: f32,
     along_factor: f32,
-    reach_along: i32,
+    radius: f32,
     lattice_u: i32,
     lattice_v: i32,
     stride: i32,
@@ -38,6 +38,8 @@ struct PeakFrame {
     square_4: f32,
     square_8: f32,
     flat: f32,
+    ragged: f32,
+    restless: f32,
 }
 
 // One peak, 12 words.

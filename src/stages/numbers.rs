@@ -41,6 +41,7 @@ pub const NUMBERS: &[(&str, &str, f64)] = &[
     ("peak", "BESIDE", fit::BESIDE as f64),
     ("peak", "BORDER_STEPS", direction::BORDER_STEPS as f64),
     ("peak", "LEAVES", direction::LEAVES as f64),
+    ("peak", "DISUNITED", direction::DISUNITED as f64),
     ("peak", "BY_NOISE", fit::BY_NOISE as f64),
     ("peak", "UNEVEN", scoring::UNEVEN as f64),
     ("peak", "DARK", scoring::DARK as f64),

@@ -10,6 +10,7 @@ mod bad_input;
 mod chain;
 mod clouds;
 mod cramer_rao;
+mod cut_stripes;
 mod engine;
 mod faint_stripes;
 mod golden;

@@ -8,7 +8,7 @@ use super::across::direction::direction;
 use super::found::{Peak, SATURATED};
 use super::grey::{Grey, Inner, Place};
 use super::lanes::LANES;
-use super::profile::{Profiles, Seen, by_columns};
+use super::profile::{Profiles, Seen};
 use super::scoring;
 
 /// Nearer than so many pixels lies a narrow stripe's own light, more on the side that its centre is nearer to.
@@ -48,22 +48,29 @@ pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s:
 #[inline(always)]
 pub(super) fn look<G: Grey>(places: &[Place<G>], profiles: &mut Profiles, s: &PeakFrame) -> [Seen; LANES] {
     let mut seen = [Seen::default(); LANES];
-    // Farther than that neither of the two looks.
-    let reach = (3 * s.lattice_u.max(s.lattice_v)).max((8.0 * s.s0 + 4.0) as i32);
+    // Farther than that none of them looks: the direction, the level beside the stripe, the profile.
+    let beside_stripe = (8.0 * s.s0 + 4.0).max(s.radius + 4.5 * s.s0 + 9.0);
+    let reach = (3 * s.lattice_u.max(s.lattice_v)).max(beside_stripe as i32);
     let inner = |x: i32, y: i32| x.min(y) >= reach && x < s.width - reach && y < s.height - reach;
     for (lane, (place, seen)) in places.iter().zip(&mut seen).enumerate() {
         let (x, y) = centred(place.image, place.at(), s);
-        *seen = if inner(x, y) { beside(Inner(place.image), x, y, s) } else { beside(place.image, x, y, s) };
-        profiles.put(lane, place, seen, s);
+        *seen = if inner(x, y) {
+            put(Inner(place.image), (x, y), lane, profiles, s)
+        } else {
+            put(place.image, (x, y), lane, profiles, s)
+        };
     }
     seen
 }
 
+/// Puts the profile at a place into a lane.
 #[inline(always)]
-fn beside<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Seen {
+fn put<G: Grey>(image: G, (x, y): (i32, i32), lane: usize, profiles: &mut Profiles, s: &PeakFrame) -> Seen {
     let n = direction(image, x, y, s);
     let (base, uneven2) = background(image, x, y, n.0, n.1, s);
-    Seen { at: (x, y), n, base, uneven2 }
+    let seen = Seen { at: (x, y), n, base, uneven2 };
+    profiles.put(lane, image, &seen, s);
+    seen
 }
 
 /// Peaks of up to [`LANES`] skeleton pixels: their profiles, then the Gaussians of all of them at once.
@@ -98,11 +105,9 @@ pub(super) fn finish(
     saturated: bool,
     s: &PeakFrame,
 ) -> Peak {
-    // Along the image axis that the profile was taken on: on the line, however the direction errs.
-    let columns = by_columns((nx, ny));
     Peak {
-        u: x as f32 + if columns { 0.0 } else { m / nx },
-        v: y as f32 + if columns { m / ny } else { 0.0 },
+        u: x as f32 + m * nx,
+        v: y as f32 + m * ny,
         normal_u: nx,
         normal_v: ny,
         amplitude,

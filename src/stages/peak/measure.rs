@@ -56,7 +56,7 @@ fn look<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame, p: &PeakParams,
     let grain_px = Grains::sigma(fits.iter().map(|f| grains(image, f.at, &f.peak, s)).collect(), before.grain_px);
     let mut more = Vec::new();
     if grain_px > 0.0 {
-        let columns = (2 * s.reach_along + 1) as usize;
+        let columns = (2 * s.reach_along() + 1) as usize;
         let pairs = grain::pairs((6.0 * s.s0) as usize * columns, columns, grain_px);
         let few = (PAIRS / pairs.max(1)).clamp(FEWEST, SAMPLES);
         let step = fits.len().div_ceil(few);
@@ -122,7 +122,7 @@ fn pixels<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame, all: &mut 
     let n = (k.normal_u, k.normal_v);
     let m = middle(at, k);
     all.clear();
-    window(image, at, n, m, s.reach_along, s, |at, d, t, level| {
+    window(image, at, n, m, s.reach_along(), s, |at, d, t, level| {
         let fade = (1.0 - s.along_factor * (t * t)).max(0.0);
         let weight = fade * fade;
         let z = (d - m) / k.width_px;
@@ -180,7 +180,7 @@ fn middle((x, y): (i32, i32), k: &Peak) -> f32 {
 /// the centre.
 fn grains<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame) -> Grains {
     let (n, m) = ((k.normal_u, k.normal_v), middle(at, k));
-    let reach = Grains::reach(s.reach_along);
+    let reach = Grains::reach(s.reach_along());
     let mut columns = vec![(0.0, 0.0, 0.0); 2 * reach as usize + 1];
     window(image, at, n, m, reach, s, |[i, _], d, _, level| {
         let (light, moment, white) = &mut columns[(i + reach) as usize];

@@ -3,12 +3,11 @@
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (2).
 
 use super::PeakFrame;
-use super::grey::{Grey, Place};
+use super::grey::Grey;
 use super::lanes::Lanes;
 use super::params::SAMPLES;
 
-/// Weights along the stripe are whole numbers up to this: sums are then exact, and four pixels of a word add up in two
-/// multiplications.
+/// Weights along the stripe are whole numbers up to this: sums are then exact.
 const WEIGHT: f32 = 127.0;
 
 /// The stripe's light over the offset across, one profile a lane, which know nothing of each other: sample k at
@@ -20,6 +19,10 @@ pub(super) struct Profiles {
     pub levels: [[Lanes; SAMPLES / 2]; 2],
     /// Shares of the weights of saturated pixels.
     pub clipped: [[Lanes; SAMPLES / 2]; 2],
+    /// Offsets of the samples from where they should be, and by how much more than `blur2` their pixels scatter about
+    /// that place.
+    pub off: [[Lanes; SAMPLES / 2]; 2],
+    pub more: [[Lanes; SAMPLES / 2]; 2],
     pub half: usize,
     /// First and last sample that lies in the picture.
     low: Lanes,
@@ -55,9 +58,9 @@ pub(super) fn by_columns((nx, ny): (f32, f32)) -> bool {
 }
 
 /// How far a window may reach to both sides along a: no farther than the picture on one of them, as an error of the
-/// direction would move the centre of a window that reaches farther to one side; and no farther than the shifted
-/// columns hold the skeleton's pixel, without whose sample a profile has no crest. At whole numbers rounding shall
-/// not decide.
+/// direction would move the centre of a window that reaches farther to one side; and no farther than the columns that
+/// follow the line lie in the picture in the skeleton pixel's sample, without which a profile has no crest. At whole
+/// numbers rounding shall not decide.
 #[inline(always)]
 fn room((a0, b0): (i32, i32), (na, nb): (f32, f32), (width, height): (i32, i32)) -> i32 {
     let across = b0.min(height - 1 - b0) as f32 * nb.abs() / na.abs().max(1e-6);
@@ -83,7 +86,9 @@ pub(super) fn clipped_within(lost: Lanes, inside: Lanes) -> Lanes {
     lost.with(inside, |lost, inside| if inside > 0.0 { lost } else { 0.0 })
 }
 
-/// The window of a profile: a counts along the image axis that the stripe is nearer to, b across it.
+/// The window of a profile: a counts along the image axis that the stripe is nearer to, b across it. It is a rectangle
+/// along the stripe: on a slanted stripe its middle moves along a from row to row. Windows of whole columns have flanks
+/// of other places of the stripe, and at edges of another surface.
 struct Window {
     columns: bool,
     a0: i32,
@@ -91,92 +96,188 @@ struct Window {
     /// The normal along a and b.
     na: f32,
     nb: f32,
-    /// First and last a that lie in the picture; how far from the skeleton's pixel they may; a group's middle.
-    begin: i32,
-    end: i32,
+    /// By how much the window's middle moves along a from row to row.
+    lean: f32,
+    /// Pixels to both sides of the middle that may have weight, and how many of them lie in the picture.
+    reach: i32,
     room: i32,
-    middle: f32,
     /// 1 / R^2 along a.
     fade: f32,
-    /// Samples that are read.
-    from: i32,
-    to: i32,
+    /// Rows of a sample.
+    tall: i32,
+    /// The picture's last pixel along a and b.
+    last: (i32, i32),
+    full_scale: i32,
 }
 
-impl Window {
-    /// Weight of the pixels i beside the skeleton's.
-    #[inline(always)]
-    fn weight(&self, i: i32) -> i32 {
-        let f = (1.0 - self.fade * (i * i) as f32).max(0.0);
-        if (-self.room..=self.end - self.a0).contains(&i) { (WEIGHT * (f * f) + 0.5) as i32 } else { 0 }
-    }
-    /// Whole pixels by which a group follows the line. Not + 0.5: at 45 degrees rounding would decide.
-    #[inline(always)]
-    fn shift(&self, a: i32) -> i32 {
-        (-(((a - self.a0) as f32 + self.middle) * self.na) / self.nb + 0.47).floor() as i32
-    }
-}
-
-/// Weighted sums over the pixels of a window; samples at k + half.
+/// Weighted sums over the pixels of a sample.
+#[derive(Clone, Copy, Default)]
 struct Gathered {
-    levels: [f32; SAMPLES],
-    clipped: [f32; SAMPLES],
-    sum: f32,
-    square: f32,
+    levels: i32,
+    clipped: i32,
+    weight: i32,
+    square: i32,
+    /// Of the offsets across from the sample's nominal one, and of their squares.
     moment: f32,
     second: f32,
 }
 
 impl Gathered {
-    /// Weights of a group's pixels, whose first lies at this offset across.
+    /// A pixel of weight g, e off its sample.
     #[inline(always)]
-    fn weigh(&mut self, c: f32, na: f32, f: [f32; 4]) {
-        let all = (f[0] + f[1]) + (f[2] + f[3]);
-        let run = na * (f[1] + (2.0 * f[2] + 3.0 * f[3]));
-        let run2 = (na * na) * (f[1] + (4.0 * f[2] + 9.0 * f[3]));
-        self.sum += all;
-        self.square += (f[0] * f[0] + f[1] * f[1]) + (f[2] * f[2] + f[3] * f[3]);
-        self.moment += c * all + run;
-        self.second += c * (c * all + 2.0 * run) + run2;
+    fn add(&mut self, g: i32, e: f32, level: i32, full_scale: i32) {
+        let f = g as f32;
+        self.levels += g * level;
+        self.clipped += if level >= full_scale { g } else { 0 };
+        self.weight += g;
+        self.square += g * g;
+        self.moment += f * e;
+        self.second += f * (e * e);
     }
+}
 
-    /// One row of each sample, pixel by pixel along the window.
+impl Window {
     #[inline(always)]
-    fn singles<G: Grey>(&mut self, image: G, w: &Window, row: i32, tall: i32, half: i32, full_scale: i32) {
-        for a in w.begin..=w.end {
-            let b = w.shift(a) + row;
-            let g = w.weight(a - w.a0);
-            self.weigh(b as f32 * w.nb + (a - w.a0) as f32 * w.na, w.na, [g as f32, 0.0, 0.0, 0.0]);
-            for k in w.from..w.to {
-                let across = w.b0 + b + k * tall;
-                let level = if w.columns { image.inside(a, across) } else { image.inside(across, a) };
-                self.levels[(k + half) as usize] += (g * level) as f32;
-                if level >= full_scale {
-                    self.clipped[(k + half) as usize] += g as f32;
-                }
-            }
+    fn new(&Seen { at: (x, y), n: (nx, ny), .. }: &Seen, s: &PeakFrame) -> Window {
+        let columns = by_columns((nx, ny));
+        let (na, nb) = if columns { (nx, ny) } else { (ny, nx) };
+        let (a0, b0, width, height) = if columns { (x, y, s.width, s.height) } else { (y, x, s.height, s.width) };
+        let lean = na * nb;
+        // Between two pixels the middle may be half of one off them.
+        let off = (lean.abs() * s.half_across * s.rows as f32).min(0.5);
+        Window {
+            columns,
+            a0,
+            b0,
+            na,
+            nb,
+            lean,
+            reach: (s.radius * nb.abs() + off).floor() as i32,
+            room: room((a0, b0), (na, nb), (width, height)),
+            fade: s.along_factor / (nb * nb),
+            tall: s.rows,
+            last: (width - 1, height - 1),
+            full_scale: s.full_scale as i32,
         }
     }
 
-    /// The same of a wide stripe by columns, four at a time.
+    /// The window's middle in a row, and the pixel there. Not + 0.5: at 45 degrees rounding would decide.
     #[inline(always)]
-    fn fours<G: Grey>(&mut self, image: G, w: &Window, row: i32, tall: i32, half: i32, full_scale: i32) {
-        for a in (w.begin..=w.end).step_by(4) {
-            let b = w.shift(a) + row;
-            let i = a - w.a0;
-            let g = [w.weight(i), w.weight(i + 1), w.weight(i + 2), w.weight(i + 3)];
-            let f = [g[0] as f32, g[1] as f32, g[2] as f32, g[3] as f32];
-            self.weigh(b as f32 * w.nb + i as f32 * w.na, w.na, f);
-            for k in w.from..w.to {
-                let [p, q, r, s] = image.four(a, w.b0 + b + k * tall);
-                self.levels[(k + half) as usize] += ((g[0] * p + g[1] * q) + (g[2] * r + g[3] * s)) as f32;
-                if p.max(q).max(r.max(s)) >= full_scale {
-                    let full = |level: i32, g: i32| if level >= full_scale { g } else { 0 };
-                    let full = (full(p, g[0]) + full(q, g[1])) + (full(r, g[2]) + full(s, g[3]));
-                    self.clipped[(k + half) as usize] += full as f32;
+    fn middle(&self, row: i32) -> (f32, i32) {
+        let middle = row as f32 * self.lean;
+        (middle, (middle + 0.47).floor() as i32)
+    }
+
+    /// Weight of a pixel i beside the skeleton's, in a row with this middle.
+    #[inline(always)]
+    fn weight(&self, i: i32, (middle, pixel): (f32, i32)) -> i32 {
+        let t = i as f32 - middle;
+        let f = (1.0 - self.fade * (t * t)).max(0.0);
+        if (i - pixel).abs() <= self.room { (WEIGHT * (f * f) + 0.5) as i32 } else { 0 }
+    }
+
+    /// Whole pixels by which a group whose middle lies there follows the line. Not + 0.5: at 45 degrees rounding would
+    /// decide.
+    #[inline(always)]
+    fn shift(&self, i: f32) -> i32 {
+        (-(i * self.na) / self.nb + 0.47).floor() as i32
+    }
+
+    /// Sample k, pixel by pixel along the window.
+    #[inline(always)]
+    fn singles<G: Grey>(&self, image: G, k: i32) -> Gathered {
+        let mut sums = Gathered::default();
+        for row in 0..self.tall {
+            let line = k * self.tall + row;
+            let middle = self.middle(line);
+            for i in middle.1 - self.reach..=middle.1 + self.reach {
+                let shift = self.shift(i as f32);
+                let (a, b) = (self.a0 + i, self.b0 + shift + line);
+                let level = if self.columns { image.whole(a, b) } else { image.whole(b, a) };
+                let e = (shift + row) as f32 * self.nb + i as f32 * self.na;
+                sums.add(self.weight(i, middle), e, level, self.full_scale);
+            }
+        }
+        sums
+    }
+
+    /// The same of a wide stripe by columns, four at a time, as they lie in memory.
+    #[inline(always)]
+    fn fours<G: Grey>(&self, image: G, k: i32, fours: i32) -> Gathered {
+        let mut sums = Gathered::default();
+        for row in 0..self.tall {
+            let line = k * self.tall + row;
+            let middle = self.middle(line);
+            let left = (self.a0 + middle.1 - 2 * fours + 2) & !3;
+            for a in (left..left + 4 * fours).step_by(4) {
+                let i = a - self.a0;
+                let shift = self.shift(i as f32 + 1.5);
+                let row_at = (self.b0 + shift + line).clamp(0, self.last.1);
+                let levels = image.four(a.clamp(0, self.last.0 & !3), row_at);
+                for (i, level) in (i..).zip(levels) {
+                    let e = (shift + row) as f32 * self.nb + i as f32 * self.na;
+                    sums.add(self.weight(i, middle), e, level, self.full_scale);
                 }
             }
         }
+        sums
+    }
+
+    /// Whether all pixels of sample k lie in the picture that have weight: those at the window's ends do. Columns that
+    /// share their shift with three others lie as much as one and a half from where it holds.
+    #[inline(always)]
+    fn holds(&self, k: i32, fours: bool) -> bool {
+        let reach = self.reach.min(self.room);
+        let shared = if fours { 1.5 } else { 0.0 };
+        [0, self.tall - 1].into_iter().all(|row| {
+            let line = k * self.tall + row;
+            let pixel = self.middle(line).1;
+            [-1, 1].into_iter().all(|end| {
+                let i = pixel + end * reach;
+                let b = self.b0 + line + self.shift(i as f32 + end as f32 * shared);
+                (0..=self.last.0).contains(&(self.a0 + i)) && (0..=self.last.1).contains(&b)
+            })
+        })
+    }
+}
+
+/// A line through what the samples' pixels are off them on average: pixels that follow a slanted line by whole steps
+/// lie a little nearer to each other, or farther apart, than those steps do. What remains is
+/// [`Profiles::off`].
+#[derive(Default)]
+struct Off {
+    all: f32,
+    k: f32,
+    kk: f32,
+    e: f32,
+    ke: f32,
+    /// Of the samples' variance, weight and squared weight.
+    blur2: f32,
+    weight: f32,
+    square: f32,
+}
+
+impl Off {
+    /// Sample k, the less certain of the line the farther it lies from the middle: `near` from 1 to 0.
+    #[inline(always)]
+    fn add(&mut self, k: f32, near: f32, sample: &Gathered) {
+        let weight = sample.weight as f32;
+        let e = sample.moment / weight;
+        self.all += near;
+        self.k += near * k;
+        self.kk += near * (k * k);
+        self.e += near * e;
+        self.ke += near * (k * e);
+        self.blur2 += near * (sample.second / weight - e * e);
+        self.weight += near * weight;
+        self.square += near * sample.square as f32;
+    }
+
+    /// What samples are off at k = 0, and by how much more from one to the next.
+    #[inline(always)]
+    fn line(&self) -> (f32, f32) {
+        let by = (self.all * self.ke - self.k * self.e) / (self.all * self.kk - self.k * self.k);
+        ((self.e - by * self.k) / self.all, by)
     }
 }
 
@@ -187,6 +288,8 @@ impl Profiles {
         Profiles {
             levels: none,
             clipped: none,
+            off: none,
+            more: none,
             half: 2 * s.quads() as usize,
             low: zero,
             high: zero,
@@ -202,53 +305,46 @@ impl Profiles {
 
     /// Puts the profile at a place into a lane.
     #[inline(always)]
-    pub fn put<G: Grey>(&mut self, lane: usize, place: &Place<G>, seen: &Seen, s: &PeakFrame) {
-        let Seen { at: (x, y), n: (nx, ny), base, uneven2 } = *seen;
-        let columns = by_columns((nx, ny));
-        let (na, nb) = if columns { (nx, ny) } else { (ny, nx) };
-        let (a0, b0, width, height) = if columns { (x, y, s.width, s.height) } else { (y, x, s.height, s.width) };
-        // A wide stripe's columns go in groups of four, as they lie in memory; all else goes one by one.
-        let fours = columns && s.fours > 0;
-        let (mask, middle) = if fours { (!3, 1.5f32) } else { (!0, 0.0) };
-        let left = if fours { (a0 - 2 * s.fours + 2) & !3 } else { a0 - s.reach_along };
-        let right = if fours { left + 4 * s.fours - 1 } else { a0 + s.reach_along };
-        let room = room((a0, b0), (na, nb), (width, height));
-        let (begin, end) = (left.max(0).max((a0 - room) & mask), right.min(width - 1).min(a0 + room));
-        let fade = s.along_factor / (nb * nb);
-        let mut window = Window { columns, a0, b0, na, nb, begin, end, room, middle, fade, from: 0, to: 0 };
-        let tall = s.rows;
-        let (first, last) = (window.shift(begin), window.shift(end & mask));
-        // Samples whose rows all lie in the picture.
-        let low = -(b0 + first.min(last)).div_euclid(tall);
-        let high = (height - 1 - first.max(last) - b0 - (tall - 1)).div_euclid(tall);
-        let half = self.half as i32;
-        (window.from, window.to) = ((-half).max(low), half.min(high + 1));
-        let none = [0.0; SAMPLES];
-        let mut sums = Gathered { levels: none, clipped: none, sum: 0.0, square: 0.0, moment: 0.0, second: 0.0 };
-        let full_scale = s.full_scale as i32;
-        for row in 0..s.rows {
-            if fours {
-                sums.fours(place.image, &window, row, tall, half, full_scale);
-            } else {
-                sums.singles(place.image, &window, row, tall, half, full_scale);
+    pub fn put<G: Grey>(&mut self, lane: usize, image: G, seen: &Seen, s: &PeakFrame) {
+        let window = Window::new(seen, s);
+        let fours = if window.columns { s.fours } else { 0 };
+        let step = window.tall as f32 * window.nb;
+        let mut off = Off::default();
+        let (mut low, mut high) = (0, 0);
+        let half = self.half;
+        for (side, j) in (0..2).flat_map(|side| (0..half).map(move |j| (side, j))) {
+            let k = number(side, j);
+            let sample = match fours {
+                0 => window.singles(image, k as i32),
+                fours => window.fours(image, k as i32, fours),
+            };
+            let scale = 1.0 / sample.weight as f32;
+            self.levels[side][j].0[lane] = sample.levels as f32 * scale;
+            self.clipped[side][j].0[lane] = sample.clipped as f32 * scale;
+            let e = sample.moment * scale;
+            self.off[side][j].0[lane] = e;
+            self.more[side][j].0[lane] = sample.second * scale - e * e;
+            off.add(k, (1.0 - (k * step).abs() / (3.0 * s.s0)).max(0.0), &sample);
+            if window.holds(k as i32, fours > 0) {
+                (low, high) = (low.min(k as i32), high.max(k as i32));
             }
         }
-        let (sum, mean, scale) = (sums.sum, sums.moment / sums.sum, 1.0 / sums.sum);
-        for j in 0..self.half {
-            for (side, at) in [(0, self.half + j), (1, self.half - 1 - j)] {
-                self.levels[side][j].0[lane] = sums.levels[at] * scale;
-                self.clipped[side][j].0[lane] = sums.clipped[at] * scale;
-            }
+        let (offset, by) = off.line();
+        let blur2 = (off.blur2 / off.all).max(0.0);
+        for (side, j) in (0..2).flat_map(|side| (0..half).map(move |j| (side, j))) {
+            let stray = self.off[side][j].0[lane] - (offset + by * number(side, j));
+            self.off[side][j].0[lane] = stray;
+            self.more[side][j].0[lane] += stray * stray - blur2;
         }
         self.low.0[lane] = low as f32;
         self.high.0[lane] = high as f32;
-        self.offset.0[lane] = mean;
-        self.step.0[lane] = tall as f32 * nb;
-        self.weight.0[lane] = sum / WEIGHT;
-        self.square.0[lane] = sums.square / (WEIGHT * WEIGHT);
-        self.blur2.0[lane] = (sums.second / sum - mean * mean).max(0.0);
-        self.base.0[lane] = base;
-        self.uneven2.0[lane] = uneven2;
+        self.offset.0[lane] = offset;
+        self.step.0[lane] = step + by;
+        self.weight.0[lane] = off.weight / (off.all * WEIGHT);
+        self.square.0[lane] = off.square / (off.all * WEIGHT * WEIGHT);
+        self.blur2.0[lane] = blur2;
+        self.base.0[lane] = seen.base;
+        self.uneven2.0[lane] = seen.uneven2;
     }
 
     /// Where the samples begin and end that lie within `reach` of m, in their numbers; not whole.

@@ -171,8 +171,8 @@ impl Scoring<'_> {
         let wide = self.profiles.step * inverse;
         let z0 = (self.profiles.offset - m) * inverse;
         let fall = exponential(-(wide * wide));
-        let up = self.side(0, a, (z0, wide), fall);
-        let down = self.side(1, a, (z0 - wide, -wide), fall);
+        let up = self.side(0, a, inverse, (z0, wide), fall);
+        let down = self.side(1, a, inverse, (z0 - wide, -wide), fall);
         Sums {
             e: std::array::from_fn(|i| up.e[i] + down.e[i]),
             r: std::array::from_fn(|i| up.r[i] + down.r[i]),
@@ -182,25 +182,28 @@ impl Scoring<'_> {
     }
 
     /// From the middle to one side, because what has become 0 stays 0. A Gaussian at equal steps: its ratio from
-    /// sample to sample falls by a constant factor.
+    /// sample to sample falls by a constant factor. The model is that of a sample which is off the
+    /// others' steps or wider, to second order.
     #[inline(always)]
-    fn side(&self, side: usize, a: Lanes, (mut z, dz): (Lanes, Lanes), fall: Lanes) -> Sums {
+    fn side(&self, side: usize, a: Lanes, inverse: Lanes, (mut z, dz): (Lanes, Lanes), fall: Lanes) -> Sums {
         let p = self.profiles;
         let (mut e, mut r) = ([Lanes::ZERO; 5], [Lanes::ZERO; 3]);
         let (mut chi2, mut count) = (Lanes::ZERO, Lanes::ZERO);
         let mut model = a * exponential(-0.5 * (z * z));
         let mut ratio = exponential(-0.5 * (dz * dz) - dz * z);
-        let samples = p.levels[side][..p.half].iter().zip(&p.clipped[side][..p.half]);
-        for (j, (&level, &lost)) in samples.enumerate() {
+        let samples = p.levels[side][..p.half].iter().zip(&p.clipped[side][..p.half]).zip(&p.off[side][..p.half]);
+        let inverse2 = Lanes::all(0.5) * (inverse * inverse);
+        for (j, (((&level, &lost), &off), &more)) in samples.zip(&p.more[side][..p.half]).enumerate() {
             let all = share(number(side, j), self.near) * p.weight;
             let light = level - p.base;
             // Clipped pixels pull while the model is below them, and are silent above.
             let above = (self.soft * (model - self.ceiling) + Lanes::all(0.5)).clamp(Lanes::ZERO, ONE);
             let heard = (ONE - above * lost).max(Lanes::all(1e-3));
-            let residual = (light - model) + (above * lost) * (model - self.ceiling);
-            let inverse = all / (heard * (self.quiet + model * (self.gain + self.speckle2 * model)));
-            let certainty = (heard * heard) * inverse;
-            let pull = (heard * inverse) * residual;
+            let there = model * ((ONE - z * (off * inverse)) + (z * z - ONE) * (more * inverse2));
+            let residual = (light - there) + (above * lost) * (model - self.ceiling);
+            let weight = all / (heard * (self.quiet + model * (self.gain + self.speckle2 * model)));
+            let certainty = (heard * heard) * weight;
+            let pull = (heard * weight) * residual;
             let (mut h, mut g) = (certainty * (model * model), pull * model);
             for sum in &mut e {
                 *sum = *sum + h;
@@ -210,7 +213,7 @@ impl Scoring<'_> {
                 *sum = *sum + g;
                 g = g * z;
             }
-            chi2 = chi2 + (inverse * residual) * residual;
+            chi2 = chi2 + (weight * residual) * residual;
             count = count + all * heard;
             model = (model * ratio).max(Lanes::all(DARK));
             ratio = ratio * fall;

@@ -55,10 +55,15 @@ pub enum Thinning {
 /// Sine of twice the angle, off the image's axes, from which a stripe counts as slanted: 22.5 degrees.
 const SLANTED: f32 = std::f32::consts::FRAC_1_SQRT_2;
 
+/// Whether a stripe that is crossed in this direction (a unit vector of the image) lies aslant.
+pub(in crate::stages) fn slanted(Vec2 { x, y }: Vec2) -> bool {
+    2.0 * (x * y).abs() > SLANTED
+}
+
 impl Thinning {
     /// The rule for a stripe that is crossed in this direction (a unit vector of the image).
-    pub fn across(Vec2 { x, y }: Vec2) -> Thinning {
-        if 2.0 * (x * y).abs() > SLANTED { Thinning::GuoHall } else { Thinning::ZhangSuen }
+    pub fn across(across: Vec2) -> Thinning {
+        if slanted(across) { Thinning::GuoHall } else { Thinning::ZhangSuen }
     }
 }
 

@@ -11,6 +11,11 @@ pub(in crate::stages) const BORDER_STEPS: u32 = 2;
 /// the border.
 pub(in crate::stages) const LEAVES: f32 = 0.3;
 
+/// How much the rig's direction counts where the gradients agree as badly as those of a straight stripe do, as a share
+/// of theirs; it counts by the square. Two surfaces, an end or print in the window leave 2 to 20 times as much, and turn
+/// the direction by 5 to 50 degrees where they cut the stripe aslant.
+pub(in crate::stages) const DISUNITED: f32 = 0.04;
+
 /// Direction across the stripe. Beside the picture's border differences reach beyond it, where all levels go on as on
 /// the border, and a slanted stripe would seem less so: there the direction is that of the stripe's next piece whose
 /// differences lie in the picture.
@@ -42,13 +47,18 @@ fn inward(x: i32, y: i32, n: (f32, f32), s: &PeakFrame) -> (i32, i32) {
     (x + (along * tu + 0.47).floor() as i32, y + (along * tv + 0.47).floor() as i32)
 }
 
+/// By how many bits gradients of a picture with this level of saturation are shortened to ten.
+pub(in crate::stages::peak) fn deep(full_scale: f32) -> u32 {
+    (full_scale as u32).count_ones().max(10) - 10
+}
+
 /// The strongest eigenvector of the structure tensor, on grey levels so far apart that noise
 /// of single pixels does not turn it, and what so far differences make of it is put right (docs/math.md, Stripe peak
 /// (1)).
 #[inline(always)]
 fn direction_at<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) {
-    let deep = (s.full_scale as u32).count_ones().max(10) - 10;
-    let (mut h, mut xy, mut q) = tensor(image, x, y, s.lattice_u, s.lattice_v, deep);
+    let deep = deep(s.full_scale);
+    let (mut h, mut xy, mut q, mut p) = tensor(image, x, y, s.lattice_u, s.lattice_v, deep);
     // Sine and cosine of twice the angle that a tensor shows; sum of c sin(k a), k = 2, 4, 6, 8.
     let twice = |h: f32, xy: f32, q: f32| (xy / q.max(1e-12), -h / q.max(1e-12));
     let turn_of = |(s2, c2): (f32, f32), c: [f32; 4]| {
@@ -60,7 +70,7 @@ fn direction_at<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) 
     // On a steep stripe the longer differences would span its whole width.
     if (if s.lattice_u > s.lattice_v { seen.1 } else { -seen.1 }) < s.flat {
         let side = s.lattice_u.min(s.lattice_v);
-        (h, xy, q) = tensor(image, x, y, side, side, deep);
+        (h, xy, q, p) = tensor(image, x, y, side, side, deep);
         turn = turn_of(twice(h, xy, q), [0.0, s.square_4, 0.0, s.square_8]);
     }
     let (nx, ny) = if h > 0.0 { (h + q, xy) } else { (xy, q - h) };
@@ -68,6 +78,14 @@ fn direction_at<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) 
         return (0.0, 1.0);
     }
     let (nx, ny) = (nx + turn * ny, ny - turn * nx);
+    // Twice the angle: what the gradients say, and the rig, the more of it the less they agree.
+    let (one, other) = (2.0 * q / (p + q), (p - q) / (s.ragged * (p + q) + s.restless));
+    let (own, rig) = (one / (nx * nx + ny * ny), DISUNITED * (other * other));
+    let (across_u, across_v) = (s.across_u, s.across_v);
+    let sine = own * (2.0 * nx * ny) + rig * (2.0 * across_u * across_v);
+    let cosine = own * (ny * ny - nx * nx) + rig * (across_v * across_v - across_u * across_u);
+    let both = (sine * sine + cosine * cosine).sqrt();
+    let (nx, ny) = if cosine > 0.0 { (sine, cosine + both) } else { (both - cosine, sine) };
     let l = (nx * nx + ny * ny).sqrt();
     let sign = if ny < 0.0 { -1.0 } else { 1.0 };
     (sign * nx / l, sign * ny / l)
@@ -85,11 +103,12 @@ fn even<G: Grey>(image: G, x: i32, y: i32, u: i32) -> [i32; 4] {
     [image.whole(x - 3 * u, y), image.whole(x - u, y), image.whole(x + u, y), image.whole(x + 3 * u, y)]
 }
 
-/// Half the difference of the diagonal, the other element, and half the difference of the eigenvalues. Sums of whole
+/// Half the difference of the diagonal, the other element, half the difference of the eigenvalues and half their sum.
+/// Sums of whole
 /// numbers, of ten bits a gradient: which pixels a profile is made of hangs on the direction, and must not hang on
 /// rounding.
 #[inline(always)]
-fn tensor<G: Grey>(image: G, x: i32, y: i32, u: i32, v: i32, deep: u32) -> (f32, f32, f32) {
+fn tensor<G: Grey>(image: G, x: i32, y: i32, u: i32, v: i32, deep: u32) -> (f32, f32, f32, f32) {
     let half = 1 << deep >> 1;
     let (a, b, c) = (odd(image, x, y - 3 * v, u), even(image, x, y - 2 * v, u), odd(image, x, y - v, u));
     let (d, e) = (even(image, x, y, u), odd(image, x, y + v, u));
@@ -110,7 +129,7 @@ fn tensor<G: Grey>(image: G, x: i32, y: i32, u: i32, v: i32, deep: u32) -> (f32,
     let ratio = v as f32 / u as f32;
     let (xx, xy, yy) = ((ratio * ratio) * sums[0] as f32, ratio * sums[1] as f32, sums[2] as f32);
     let d = 0.5 * (xx - yy);
-    (d, xy, (d * d + xy * xy).sqrt())
+    (d, xy, (d * d + xy * xy).sqrt(), 0.5 * (xx + yy))
 }
 
 #[inline(always)]

@@ -4,9 +4,13 @@
 
 /// Angles that the correction is fitted to.
 const ANGLES: usize = 12;
-/// A stripe that is seen flatter than this, rad, keeps the lattice that is longer along it; the others take a square
+/// A stripe that lies flatter than this, degrees, keeps the lattice that is longer along it; the others take a square
 /// one.
-pub(in crate::stages::peak) const FLAT: f64 = 33.0 * std::f64::consts::PI / 180.0;
+const FLATTEST: usize = 33;
+/// A stripe that is steeper than the last flat one by `STEEPER` degrees must be seen steeper by `APART`, rad: noise
+/// turns what is seen by two degrees.
+const STEEPER: usize = 5;
+const APART: f64 = 3.0 * std::f64::consts::PI / 180.0;
 
 /// Angle of the tensor's strongest direction on a straight Gaussian stripe whose normal is (sin a, cos a).
 fn seen(a: f64, s0: f64, (u, v): (i32, i32)) -> f64 {
@@ -27,6 +31,15 @@ fn seen(a: f64, s0: f64, (u, v): (i32, i32)) -> f64 {
         }
     }
     0.5 * (2.0 * xy).atan2(yy - xx)
+}
+
+/// The steepest angle, rad, of a stripe that keeps the lattice `(along, across)`, and the angle that it is seen at. On
+/// stripes narrower than 0.85 px steeper angles are seen flatter: at 0.7 px, 45 degrees as 30.
+pub(in crate::stages::peak) fn flattest(s0: f32, lattice: (i32, i32)) -> (f64, f64) {
+    let seen: Vec<f64> = (0..=90).map(|a| seen(f64::from(a).to_radians(), f64::from(s0), lattice)).collect();
+    let told = |a: &usize| seen[a + STEEPER..].iter().all(|steeper| *steeper > seen[*a] + APART);
+    let last = (0..=FLATTEST).rev().find(told).unwrap_or(0);
+    ((last as f64).to_radians(), seen[last])
 }
 
 /// Differences over nearly three widths are no derivatives, and a lattice that is not square weighs them differently:
@@ -59,6 +72,8 @@ pub(in crate::stages::peak) fn turn<const N: usize>(
 pub(in crate::stages) const EVEN_ROW: [i32; 3] = [16, 36, 16];
 pub(in crate::stages) const MIDDLE_ROW: [i32; 3] = [36, 64, 36];
 pub(in crate::stages) const DIAGONAL: i32 = 49;
+/// The sum of all 13.
+pub(in crate::stages::peak) const WEIGHTS: f32 = (64 + 4 * 49 + 4 * 36 + 4 * 16) as f32;
 
 /// Places of the gradients and their weights: every other one of a lattice, because a gradient looks at its four
 /// neighbours, which lie on the other colour of the board.
