@@ -95,11 +95,15 @@ fn direction_at(x: i32, y: i32) -> vec2<f32> {
     let n = vec2(m.x + turn * m.y, m.y - turn * m.x);
     // Twice the angle: what the gradients say, and the rig, the more of it the less they agree.
     let other = (t.w - q) / (frame.ragged * (t.w + q) + frame.restless);
-    let own = 2.0 * q / (t.w + q) / (n.x * n.x + n.y * n.y);
-    let rig = DISUNITED * (other * other);
+    let own = 2.0 * q / (t.w + q);
+    let length2 = n.x * n.x + n.y * n.y;
+    let own2 = vec2(2.0 * n.x * n.y, n.y * n.y - n.x * n.x) / vec2(length2);
     let across = vec2(frame.across_u, frame.across_v);
-    let sine = own * (2.0 * n.x * n.y) + rig * (2.0 * across.x * across.y);
-    let cosine = own * (n.y * n.y - n.x * n.x) + rig * (across.y * across.y - across.x * across.x);
+    let rig2 = vec2(2.0 * across.x * across.y, across.y * across.y - across.x * across.x);
+    // None of it where the stripe lies 45 degrees off: that is no edge's doing.
+    let rig = DISUNITED * (other * other) * max(own2.x * rig2.x + own2.y * rig2.y, 0.0);
+    let sine = own * own2.x + rig * rig2.x;
+    let cosine = own * own2.y + rig * rig2.y;
     let both = sqrt(sine * sine + cosine * cosine);
     let told = select(vec2(both - cosine, sine), vec2(sine, cosine + both), cosine > 0.0);
     let length = sqrt(told.x * told.x + told.y * told.y);

@@ -80,10 +80,13 @@ fn direction_at<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) 
     let (nx, ny) = (nx + turn * ny, ny - turn * nx);
     // Twice the angle: what the gradients say, and the rig, the more of it the less they agree.
     let (one, other) = (2.0 * q / (p + q), (p - q) / (s.ragged * (p + q) + s.restless));
-    let (own, rig) = (one / (nx * nx + ny * ny), DISUNITED * (other * other));
+    let length2 = nx * nx + ny * ny;
+    let (s2, c2) = (2.0 * nx * ny / length2, (ny * ny - nx * nx) / length2);
     let (across_u, across_v) = (s.across_u, s.across_v);
-    let sine = own * (2.0 * nx * ny) + rig * (2.0 * across_u * across_v);
-    let cosine = own * (ny * ny - nx * nx) + rig * (across_v * across_v - across_u * across_u);
+    let (rig_s2, rig_c2) = (2.0 * across_u * across_v, across_v * across_v - across_u * across_u);
+    // None of it where the stripe lies 45 degrees off: that is no edge's doing.
+    let rig = DISUNITED * (other * other) * (s2 * rig_s2 + c2 * rig_c2).max(0.0);
+    let (sine, cosine) = (one * s2 + rig * rig_s2, one * c2 + rig * rig_c2);
     let both = (sine * sine + cosine * cosine).sqrt();
     let (nx, ny) = if cosine > 0.0 { (sine, cosine + both) } else { (both - cosine, sine) };
     let l = (nx * nx + ny * ny).sqrt();
