@@ -57,7 +57,7 @@ def organise(scan: Scan, *, points: npt.NDArray[Any] | None = None, along: str |
     along = along or spread_along(points)
     image = scan.report["image"]
     columns = int(image["width" if along == "u" else "height"])
-    rows = 1 + max(places[-1][0], int(points["shot"].max()))
+    rows = 1 + max(int(points["shot"].max()), *(shot for shot, _ in places))
 
     grid = np.empty((rows, columns), POINT)
     for name in POINT.names or ():

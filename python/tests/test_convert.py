@@ -55,6 +55,13 @@ def test_xarray(scanned):
     assert np.array_equal(np.reshape(data.attrs["base_from_grid"], (4, 4)), map_.base_from_grid)
 
 
+def rows_of(chunk) -> tuple[str, list[dict]]:
+    """What a chunk of a rerun file holds, but for the clock's times, which Python has no numbers for."""
+    batch = chunk.to_record_batch()
+    names = [name for name in batch.schema.names if name == "shot" or "3D:" in name]
+    return chunk.entity_path, batch.select(names).to_pylist()
+
+
 def test_rerun(scanned, tmp_path):
     rerun = needs("rerun", heavy=True)
     file = tmp_path / "scan.rrd"
@@ -62,16 +69,20 @@ def test_rerun(scanned, tmp_path):
     recording.save(file)
     sheetlight.log_to_rerun(scanned, recording=recording)
     del recording
-    loaded = list(rrd_chunks(file))
+    read = [rows_of(chunk) for chunk in needs("rerun.chunk", heavy=True).RrdReader(file).stream()]
     points = scanned.points
-    of_points = {path: t for path, t in loaded if path.startswith("/scan/points/")}
-    assert len(of_points) == len(np.unique(points["shot"]))
-    sixty = of_points["/scan/points/60"]
-    places = np.array(sixty.column("Points3D:positions")[0].to_pylist()).reshape(-1, 3)
-    assert np.array_equal(places, sheetlight.xyz(points[points["shot"] == 60]))
-    assert sixty.column("shot").to_pylist() == [60]
-    camera = [row for path, t in loaded if path == "/scan/camera" for row in t.to_pylist()]
-    assert sorted(row["shot"] for row in camera) == [shot for shot, _ in scanned.camera_places]
+    shown = {path: rows for path, rows in read if path.startswith("/scan/points/")}
+    assert len(shown) == len(np.unique(points["shot"]))
+    (sixty,) = shown["/scan/points/60"]
+    assert sixty["shot"] == 60
+    assert np.array_equal(sixty["Points3D:positions"], sheetlight.xyz(points[points["shot"] == 60]))
+    camera = {row["shot"]: row for path, rows in read if path == "/scan/camera" for row in rows}
+    assert sorted(camera) == [shot for shot, _ in scanned.camera_places]
+    for shot, place in scanned.camera_places:
+        # Column by column, float32.
+        turn = np.reshape(camera[shot]["Transform3D:mat3x3"], (3, 3)).T
+        assert np.allclose(turn, place[:3, :3], atol=1e-6)
+        assert np.allclose(camera[shot]["Transform3D:translation"], place[:3, 3], rtol=1e-6)
 
 
 @pytest.mark.parametrize(
