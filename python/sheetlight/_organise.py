@@ -64,12 +64,15 @@ def organise(scan: Scan, *, points: npt.NDArray[Any] | None = None, along: str |
         grid[name] = np.arange(rows)[:, None] if name == "shot" else np.nan
     pixel = np.clip(np.rint(points[along]), 0, columns - 1).astype(np.int64)
     cell = points["shot"].astype(np.int64) * columns + pixel
-    # The best of a cell comes last, and stays.
-    order = np.lexsort((-points["sigma"], points["quality"], cell))
-    cells = cell[order]
-    best = order[np.append(cells[1:] != cells[:-1], True)]
+    alone = np.bincount(cell, minlength=rows * columns)[cell] == 1
+    grid.reshape(-1)[cell[alone]] = points[alone]
+    # Few share a cell: only those are put in order. The best of a cell comes last, and stays.
+    several = np.flatnonzero(~alone)
+    order = several[np.lexsort((-points["sigma"][several], points["quality"][several], cell[several]))]
+    last = np.append(cell[order][1:] != cell[order][:-1], True)[: len(order)]
+    best = order[last]
     grid.reshape(-1)[cell[best]] = points[best]
-    return Organised(grid, along, len(points) - len(best), scan.frame)
+    return Organised(grid, along, len(several) - len(best), scan.frame)
 
 
 def some_of(scan: Scan, points: npt.NDArray[Any] | None) -> npt.NDArray[Any]:

@@ -229,15 +229,15 @@ def test_a_name_that_is_taken_is_refused(scanned, tmp_path, ending):
 
 
 def test_a_name_that_is_taken_meanwhile_is_refused(scanned, tmp_path, monkeypatch):
-    from sheetlight._files import save as module
+    from sheetlight._files import ply
 
     file = tmp_path / "cloud.ply"
 
-    def slow(part, cloud):
+    def slow(part, organised, about):
         part.write_text("ours")
         file.write_text("mine")
 
-    monkeypatch.setitem(module._FORMATS, ".ply", module._FORMATS[".ply"]._replace(write=slow))
+    monkeypatch.setattr(ply, "write", slow)
     with pytest.raises(SheetlightError, match="there already"):
         sheetlight.save(scanned, file)
     assert file.read_text() == "mine" and list(tmp_path.iterdir()) == [file]
@@ -324,6 +324,6 @@ def test_more_shots_than_an_e57_file_numbers(scanned, tmp_path):
     late["shot"] += 65_500
     image = {"width": 640, "height": 1, "bits": 8}
     scan = like(scanned, points=late[-400:], report={**scanned.report, "image": image})
-    with pytest.raises(SheetlightError, match="65535"):
+    with pytest.raises(SheetlightError, match="of shot 65619, .* to shot 65535"):
         sheetlight.save(scan, tmp_path / "cloud.e57")
     assert list(tmp_path.iterdir()) == []

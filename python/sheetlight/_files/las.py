@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from math import ceil, log10
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from .._optional import needed
-from .cloud import Cloud
+from .about import About
 
 #: Fields that the format has no place for.
 LOST: tuple[str, ...] = ()
@@ -32,26 +34,25 @@ STEP = 1e-8
 REACH = 2**31 - 1
 
 
-def write(file: Path, cloud: Cloud) -> None:
+def write(file: Path, points: npt.NDArray[Any], about: About) -> None:
     """Writes LAZ where the name ends so, else LAS."""
     laspy = needed("laspy", "a LAS or LAZ file", "files")
     if file.suffix.lower() == ".laz":
         needed("lazrs", "a LAZ file", "files")
-    points = cloud.points
     metres = np.stack([points[axis] for axis in "xyz"], axis=-1).astype(np.float64) / 1000
     middle = np.round((metres.min(axis=0) + metres.max(axis=0)) / 2, 3)
     half = np.abs(metres - middle).max()
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.offsets = middle
     header.scales = np.full(3, max(STEP, 10.0 ** ceil(log10(max(half, STEP) / REACH))))
-    header.generating_software = cloud.program[:32]
+    header.generating_software = about.program[:32]
     header.system_identifier = "laser line scan"
     header.global_encoding.wkt = True
-    header.vlrs.append(laspy.VLR("LASF_Projection", 2112, "OGC WKT", local_system(cloud.frame).encode() + b"\0"))
+    header.vlrs.append(laspy.VLR("LASF_Projection", 2112, "OGC WKT", local_system(about.frame).encode() + b"\0"))
     header.add_extra_dims([laspy.ExtraBytesParams(name, kind, what) for name, _, kind, what in EXTRA])
     las = laspy.LasData(header)
     las.x, las.y, las.z = metres.T
-    stretched = np.rint(points["intensity"] * (65_535 / cloud.full_scale))
+    stretched = np.rint(points["intensity"] * (65_535 / about.full_scale))
     las.intensity = stretched.clip(0, 65_535).astype(np.uint16)
     las.return_number[:] = 1
     las.number_of_returns[:] = 1

@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
+
+import numpy.typing as npt
 
 from .._dtypes import POINT
 from .._optional import needed
-from .cloud import NAMES, Cloud
+from .about import NAMES, About
 
 #: Fields that the format has no place for.
 LOST: tuple[str, ...] = ()
@@ -29,7 +32,7 @@ UNITS = {
 }
 
 
-def write(file: Path, cloud: Cloud) -> None:
+def write(file: Path, points: npt.NDArray[Any], about: About) -> None:
     """Writes the table."""
     arrow = needed("pyarrow", "a Parquet file", "files")
     parquet = needed("pyarrow.parquet", "a Parquet file", "files")
@@ -38,7 +41,7 @@ def write(file: Path, cloud: Cloud) -> None:
         kind = arrow.from_numpy_dtype(POINT[field])
         return arrow.field(NAMES[field], kind, nullable=False, metadata={"unit": UNITS[field]})
 
-    about = {"units": "mm", "frame": cloud.frame, "program": cloud.program}
-    schema = arrow.schema([column(field) for field in NAMES], metadata={"sheetlight": json.dumps(about)})
-    columns = [arrow.array(cloud.points[field]) for field in NAMES]
+    said = {"units": "mm", "frame": about.frame, "program": about.program}
+    schema = arrow.schema([column(field) for field in NAMES], metadata={"sheetlight": json.dumps(said)})
+    columns = [arrow.array(points[field]) for field in NAMES]
     parquet.write_table(arrow.table(columns, schema=schema), str(file))

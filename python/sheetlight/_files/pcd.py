@@ -8,21 +8,22 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .cloud import NAMES, Cloud, layout
+from .._organise import Organised
+from .about import NAMES, About, layout
 
 #: Fields that the format has no place for.
 LOST: tuple[str, ...] = ()
 
 
-def write(file: Path, cloud: Cloud) -> None:
+def write(file: Path, organised: Organised, about: About) -> None:
     """Writes the organised cloud."""
-    grid = cloud.organised.points
+    grid = organised.points
     rows, columns = grid.shape
     n = len(NAMES)
     lines = [
         "# .PCD v0.7 - Point Cloud Data file format",
-        f"# {cloud.program}, organised cloud, {cloud.frame} frame, mm",
-        f"# {layout(cloud.organised)}",
+        f"# {about.program}, organised cloud, {about.frame} frame, mm",
+        f"# {layout(organised)}",
         "VERSION 0.7",
         f"FIELDS {' '.join(NAMES.values())}",
         f"SIZE {' '.join(['4'] * n)}",

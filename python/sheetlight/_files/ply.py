@@ -8,21 +8,22 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .cloud import NAMES, Cloud, layout
+from .._organise import Organised
+from .about import NAMES, About, layout
 
 #: Fields that the format has no place for.
 LOST: tuple[str, ...] = ()
 
 
-def write(file: Path, cloud: Cloud) -> None:
+def write(file: Path, organised: Organised, about: About) -> None:
     """Writes the organised cloud."""
-    grid = cloud.organised.points
+    grid = organised.points
     rows, columns = grid.shape
     lines = [
         "ply",
         "format binary_little_endian 1.0",
-        f"comment {cloud.program}, organised cloud, {cloud.frame} frame, mm",
-        f"comment {layout(cloud.organised)}",
+        f"comment {about.program}, organised cloud, {about.frame} frame, mm",
+        f"comment {layout(organised)}",
         f"obj_info num_cols {columns}",
         f"obj_info num_rows {rows}",
         f"element vertex {grid.size}",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, Union
 
@@ -13,28 +12,13 @@ from .._engine import Scan
 from .._error import SheetlightError
 from .._organise import organise, some_of
 from . import e57, las, parquet, pcd, ply, tiff
+from .about import About
 from .aside import aside
-from .cloud import Cloud
 
-
-class _Format(NamedTuple):
-    """A format: its writer, whether it is in rows and columns, what it has no place for."""
-
-    write: Callable[[Path, Cloud], None]
-    organised: bool
-    lost: tuple[str, ...]
-
-
-_FORMATS = {
-    ".ply": _Format(ply.write, True, ply.LOST),
-    ".pcd": _Format(pcd.write, True, pcd.LOST),
-    ".tif": _Format(tiff.write, True, tiff.LOST),
-    ".tiff": _Format(tiff.write, True, tiff.LOST),
-    ".e57": _Format(e57.write, False, e57.LOST),
-    ".las": _Format(las.write, False, las.LOST),
-    ".laz": _Format(las.write, False, las.LOST),
-    ".parquet": _Format(parquet.write, False, parquet.LOST),
-}
+#: Endings of files in rows and columns.
+_ORGANISED = {".ply": ply, ".pcd": pcd, ".tif": tiff, ".tiff": tiff}
+#: Endings of files of points.
+_POINTS = {".e57": e57, ".las": las, ".laz": las, ".parquet": parquet}
 
 
 class Saved(NamedTuple):
@@ -76,21 +60,25 @@ def save(
     if not isinstance(path, (str, os.PathLike)):
         raise SheetlightError(f"path is a {type(path).__name__}, a file's name is needed", "", "give e.g. 'part.e57'")
     file = Path(path)
-    form = _FORMATS.get(file.suffix.lower())
-    if form is None:
+    ending = file.suffix.lower()
+    if ending not in {**_ORGANISED, **_POINTS}:
         raise SheetlightError(
             f"{file} ends in '{file.suffix}', which is no format that is written",
             "the ending says the format",
-            f"use one of {', '.join(_FORMATS)}",
+            f"use one of {', '.join([*_ORGANISED, *_POINTS])}",
         )
     report = scan.report
-    chosen = some_of(scan, points)
-    organised = organise(scan, points=chosen)
-    full_scale = (1 << int(report["image"]["bits"])) - 1
-    cloud = Cloud(chosen, organised, scan.frame, str(report["program"]), full_scale)
+    about = About(scan.frame, str(report["program"]), (1 << int(report["image"]["bits"])) - 1)
+    chosen, left_out = some_of(scan, points), 0
     try:
         with aside(file, overwrite) as part:
-            form.write(part, cloud)
+            if ending in _ORGANISED:
+                organised = organise(scan, points=chosen)
+                left_out, lost = organised.left_out, _ORGANISED[ending].LOST
+                _ORGANISED[ending].write(part, organised, about)
+            else:
+                lost = _POINTS[ending].LOST
+                _POINTS[ending].write(part, chosen, about)
     except SheetlightError:
         raise
     # The formats' packages have exceptions of their own.
@@ -100,5 +88,4 @@ def save(
             "the folder is missing or protected, or the disk is full",
             "make room, or choose another folder; nothing was left under that name",
         ) from error
-    left_out = organised.left_out if form.organised else 0
-    return Saved(file, len(chosen) - left_out, left_out, form.lost)
+    return Saved(file, len(chosen) - left_out, left_out, lost)

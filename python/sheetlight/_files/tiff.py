@@ -11,23 +11,24 @@ from pathlib import Path
 import numpy as np
 
 from .._optional import needed
-from .cloud import Cloud, layout
+from .._organise import Organised
+from .about import About, layout
 
 #: Fields that the format has no place for.
 LOST = ("sigma", "intensity", "quality", "u", "v")
 
 
-def write(file: Path, cloud: Cloud) -> None:
+def write(file: Path, organised: Organised, about: About) -> None:
     """Writes the three pictures."""
     tifffile = needed("tifffile", "a TIFF of x, y and z", "files")
-    grid = cloud.organised.points
+    grid = organised.points
     with tifffile.TiffWriter(str(file)) as out:
         for axis in "xyz":
             out.write(
                 np.ascontiguousarray(grid[axis]),
                 photometric="minisblack",
-                description=f"{axis}, mm, {cloud.frame} frame; {layout(cloud.organised)}",
-                software=cloud.program,
+                description=f"{axis}, mm, {about.frame} frame; {layout(organised)}",
+                software=about.program,
                 metadata=None,
                 contiguous=False,
             )

@@ -1,23 +1,16 @@
-"""What every format is written from."""
+"""What files say of a scan's points."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
-
-import numpy.typing as npt
 
 from .._organise import Organised
 
 
 @dataclass(frozen=True)
-class Cloud:
-    """Points with what files say of them."""
+class About:
+    """What is true of all points of a scan."""
 
-    #: POINT, finite places, at least one.
-    points: npt.NDArray[Any]
-    #: The same in rows and columns.
-    organised: Organised
     #: Frame of x, y and z, which are mm.
     frame: str
     #: Name and version of the program that measured them.
