@@ -32,6 +32,7 @@ def refused(call, *words: str) -> SheetlightError:
         (lambda p: p.astype(np.int8), ["int8"]),
         (lambda p: p.astype(complex), ["complex128"]),
         (lambda p: p.astype(object), ["object"]),
+        (lambda p: np.ma.masked_greater(p, 200), ["MaskedArray", "masks"]),
         (lambda p: np.zeros((4, 4), [("grey", "u1")]), ["grey"]),
         (lambda p: p.astype(np.uint16), ["bits is not given"]),
         (lambda p: np.stack([p] * 3, axis=-1), ["(480, 640, 3)".replace("(", "[").replace(")", "]")]),
@@ -205,6 +206,26 @@ def test_whatever_a_generator_raises_is_the_cause(recording, station, at, error)
         said = refused(lambda: sheetlight.scan(some(), station, skip_bad=skip_bad), f"picture {at}")
         # Python makes a RuntimeError of a StopIteration within a generator.
         assert said.__cause__ is error or said.__cause__.__cause__ is error
+
+
+def test_poses_that_end_are_not_real_or_look_like_metres(arrays, station):
+    pictures, poses = arrays
+
+    def some():
+        yield poses[0]
+        raise OSError("the controller was switched off")
+
+    error = refused(lambda: sheetlight.scan(pictures[:8], station, some()), "pose 1", "switched off")
+    assert isinstance(error.__cause__, OSError)
+    refused(lambda: sheetlight.scan(pictures[:8], station, poses[:8] * 1j), "pose 0", "complex")
+    refused(lambda: sheetlight.scan(pictures[:8], station, np.ma.masked_less(poses[:8], 0)), "pose 0", "masked")
+    metres = poses[:8].copy()
+    metres[:, :3, 3] /= 1000
+    with pytest.warns(UserWarning, match="look like metres"):
+        try:
+            sheetlight.scan(pictures[:8], station, metres)
+        except SheetlightError:
+            pass
 
 
 def test_an_exception_of_our_own_comes_through_as_it_is(recording, station):
