@@ -174,14 +174,14 @@ fn unsolved() -> Fault {
 }
 
 /// The ways in which the board may differ from its drawing, where all pictures show the same one.
-fn one_board(pictures: &[Observation]) -> Option<Basis> {
+pub(super) fn one_board(pictures: &[Observation]) -> Option<Basis> {
     let first = pictures.first()?;
     pictures.iter().all(|o| o.features == first.features).then(|| Basis::of(&first.features)).flatten()
 }
 
 /// Corners with sigmas for the solver. A floor keeps a few very sharp corners from ruling: printing
 /// and flatness leave about 0.01 px on any real board.
-fn measured(o: &Observation, weigh: bool) -> Vec<Corner> {
+pub(super) fn measured(o: &Observation, weigh: bool) -> Vec<Corner> {
     let sigma = |s: f64| if weigh { s.hypot(0.01) } else { 1.0 };
     o.view.points.iter().map(|p| (o.features[p.feature_id], p.pixel, sigma(p.sigma_px))).collect()
 }

@@ -1,0 +1,190 @@
+//! Sets in which some pictures were turned, mirrored, cropped or refocused are named; right sets never are, of bent
+//! boards neither.
+
+use crate::camera_judge::{Station, random_station, seen};
+use crate::common::judge::between;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+use sheetlight::calibrate::camera::intrinsics::{Observation, SolveOptions, solve};
+use sheetlight::calibrate::camera::parts::apart;
+use sheetlight::calibrate::camera::procedure::{CameraOptions, calibrate, from_observations};
+use sheetlight::calibrate::flipped::flipped;
+use sheetlight::calibrate::measured_pose::{MeasuredPose, intrinsic_covariance, measure_view};
+use sheetlight::camera::{Flip, Intrinsics};
+use sheetlight::geometry::{Vec2, Vec3};
+use sheetlight::recording::BoardSpec;
+use std::sync::Arc;
+
+const KINDS: [&str; 5] = ["turned by 180", "mirrored left", "mirrored upside", "region", "focal length"];
+
+/// A board of 9x6 corners reads a mirrored picture as another one of itself.
+fn mirrored(o: &mut Observation) {
+    for p in &mut o.view.points {
+        p.feature_id = p.feature_id / 9 * 9 + 8 - p.feature_id % 9;
+    }
+    o.view.points.sort_by_key(|p| p.feature_id);
+}
+
+/// Pictures of a station, some of them of kind `kind` of [`KINDS`]; which ones.
+fn mixed(s: &Station, kind: usize, seed: u64) -> (Vec<Observation>, Vec<usize>) {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let n = s.poses.len();
+    let count = ((n as f64 * between(&mut rng, 0.1, 0.5)) as usize).max(1);
+    let first = rng.random_range(0..=n - count);
+    // One after the other, or anywhere.
+    let mut which: Vec<usize> = if rng.random::<bool>() {
+        (first..first + count).collect()
+    } else {
+        rand::seq::index::sample(&mut rng, n, count).into_vec()
+    };
+    which.sort_unstable();
+    let share = between(&mut rng, 0.005, 0.02) * if rng.random::<bool>() { 1.0 } else { -1.0 };
+    let refocused = Intrinsics { fx: s.camera.fx * (1.0 + share), fy: s.camera.fy * (1.0 + share), ..s.camera };
+    let cropped = Vec2::new(between(&mut rng, 4.0, 60.0).round(), between(&mut rng, -40.0, 40.0).round());
+    let (w, h) = (f64::from(s.camera.width) - 1.0, f64::from(s.camera.height) - 1.0);
+    let mut pictures = seen(s, seed);
+    let others = seen(&Station { camera: refocused, features: s.features.clone(), poses: s.poses.clone(), ..*s }, seed);
+    for &i in &which {
+        if kind == 4 {
+            pictures[i] = others[i].clone();
+        }
+        let o = &mut pictures[i];
+        for p in &mut o.view.points {
+            let [x, y] = [p.pixel.x, p.pixel.y];
+            p.pixel = match kind {
+                0 => Vec2::new(w - x, h - y),
+                1 => Vec2::new(w - x, y),
+                2 => Vec2::new(x, h - y),
+                3 => p.pixel - cropped,
+                _ => p.pixel,
+            };
+        }
+        if matches!(kind, 1 | 2) {
+            mirrored(o);
+        }
+    }
+    (pictures, which)
+}
+
+/// What is said of the set: all of it, and which pictures are named in it; how far its camera is off, in stated sigmas.
+fn said(pictures: Vec<Observation>, s: &Station) -> (String, Vec<usize>, f64) {
+    let n = pictures.len();
+    let [w, h] = [s.camera.width, s.camera.height];
+    let result = from_observations(pictures, Vec::new(), w, h, &CameraOptions::default());
+    let off = result.as_ref().map_or(f64::INFINITY, |r| {
+        let (is, truth) = (r.calibration.value.parameters(), s.camera.parameters());
+        let sigma = |i: usize| r.solved.covariance.map_or(0.0, |c| c[(i, i)].sqrt());
+        (0..4).map(|i| (is[i] - truth[i]).abs() / sigma(i)).fold(0.0, f64::max)
+    });
+    let text = match result {
+        Ok(r) => r.left_out.iter().map(|(name, why)| format!("left out {name}, {why}; ")).collect(),
+        Err(fault) => fault.to_string(),
+    };
+    let words: Vec<&str> = text.split(|c: char| !c.is_alphanumeric()).collect();
+    let named = |i: &usize| words.windows(2).any(|w| w[0] == "picture" && w[1] == i.to_string());
+    (text.clone(), (0..n).filter(named).collect(), off)
+}
+
+/// A turn about a middle that is the principal point changes nothing: the set is then right.
+fn matters(s: &Station, kind: usize) -> bool {
+    let off = |c: f64, size: u32| (c - (f64::from(size) - 1.0) / 2.0).abs() > 1.5;
+    let (x, y) = (off(s.camera.cx, s.camera.width), off(s.camera.cy, s.camera.height));
+    [x || y, x, y, true, true][kind]
+}
+
+#[test]
+fn pictures_that_were_read_out_otherwise_are_named() {
+    let sets = if std::env::var_os("SHEETLIGHT_LONG").is_some() { 100 } else { 10 };
+    let (mut all, mut exact, mut harmless, mut missed) = (0, 0, 0, Vec::new());
+    for k in 0..sets {
+        let (kind, seed) = (k as usize % KINDS.len(), 60_000 + k);
+        let mut s = random_station(seed);
+        s.sigma_px = s.sigma_px.min(0.1);
+        if !matters(&s, kind) {
+            continue;
+        }
+        all += 1;
+        let (pictures, which) = mixed(&s, kind, seed);
+        let (text, named, off) = said(pictures, &s);
+        exact += usize::from(named == which || 2 * which.len() == s.poses.len());
+        // Refused, or the pictures left out.
+        let told = text.contains("not of the camera") || named == which;
+        // A small change of a few pictures that tell little of it: the camera is as good as it says all the same.
+        harmless += usize::from(!told && off < 3.0);
+        if !told && off >= 3.0 {
+            let (n, sigma) = (s.poses.len(), s.sigma_px);
+            missed.push(format!(
+                "{k}: {} of {which:?} of {n}, {sigma:.2} px, off {off:.1}, named {named:?}: {text}",
+                KINDS[kind]
+            ));
+        }
+    }
+    let told = all - missed.len() - harmless;
+    println!("{told} of {all} mixed sets refused or sorted, {exact} by the right pictures; {harmless} did no harm");
+    assert!(missed.len() * 100 <= 3 * all.max(34), "{} of {all} not named:\n{}", missed.len(), missed.join("\n"));
+}
+
+#[test]
+fn right_sets_are_never_accused() {
+    let sets = if std::env::var_os("SHEETLIGHT_LONG").is_some() { 200 } else { 8 };
+    for k in 0..sets {
+        let mut s = random_station(70_000 + k);
+        let flat = s.features.clone();
+        // Every second board is bent by up to a millimetre and printed a little long.
+        if k % 2 == 1 {
+            let bow = between(&mut Pcg64::seed_from_u64(k), 0.1, 1.0);
+            let bent = |x: &Vec3| {
+                let (u, v) = ((x.x - 60.0) / 60.0, (x.y - 37.5) / 60.0);
+                *x + Vec3::new(0.02 * v, 0.12 * v, bow * ((1.2 * (u + 0.4 * v)).cos() - 1.0))
+            };
+            s.features = Arc::new(flat.iter().map(bent).collect());
+        }
+        let mut pictures = seen(&s, 70_000 + k);
+        pictures.iter_mut().for_each(|o| o.features = flat.clone());
+        let options = SolveOptions::default();
+        let solved = solve(&pictures, s.camera.width, s.camera.height, &options).unwrap();
+        assert_eq!(apart(&pictures, &solved, &options), None, "{k}");
+    }
+}
+
+/// Photographs of one camera, half of them turned by the program that saved them.
+#[test]
+fn photographs_half_of_which_are_turned_are_refused() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/half_turned");
+    let recording = sheetlight::recording::Recording::open(&folder).unwrap();
+    let fault = calibrate(&[recording], &CameraOptions::default(), &|_, _| ()).unwrap_err();
+    assert!(fault.what.contains("turned by 180 degrees"), "{fault}");
+    assert!(fault.what.starts_with("5 of 10 pictures"), "{fault}");
+}
+
+/// Boards before a camera that is calibrated: turned pictures of them are named, right ones are not.
+#[test]
+fn boards_tell_pictures_that_were_turned_against_the_calibration() {
+    let board =
+        BoardSpec::Chessboard { inner_corners: [9, 6], square_mm: 15.0, border_mm: 9.0, first_square: "black".into() };
+    for k in 0..9 {
+        let mut s = random_station(80_000 + k);
+        s.sigma_px = s.sigma_px.min(0.1);
+        let [w, h] = [s.camera.width, s.camera.height];
+        let known = from_observations(seen(&s, k), vec![], w, h, &CameraOptions::default()).unwrap().calibration;
+        let belief = intrinsic_covariance(&known.covariance).unwrap();
+        let told = |turned: usize| {
+            let mut pictures = seen(&s, 100 + k);
+            for p in pictures[..turned].iter_mut().flat_map(|o| &mut o.view.points) {
+                p.pixel = Vec2::new(f64::from(w) - 1.0 - p.pixel.x, f64::from(h) - 1.0 - p.pixel.y);
+            }
+            let pose = |o: &Observation| measure_view(&o.name, &known.value, &board, &o.view).unwrap();
+            let poses: Vec<MeasuredPose> = pictures.iter().map(pose).collect();
+            flipped(&poses.iter().collect::<Vec<_>>(), &known.value, &belief)
+        };
+        assert_eq!(told(0), None, "{k}: right pictures were accused");
+        if matters(&s, 0) {
+            for turned in [3, s.poses.len()] {
+                let (which, flip) = told(turned).expect("turned pictures are told");
+                // A board in the picture's middle tells nothing.
+                let right = which.iter().all(|i| *i < turned) && 4 * which.len() >= 3 * turned;
+                assert!(flip == Flip::Turned && right, "{k}: {turned} turned, named {which:?}");
+            }
+        }
+    }
+}
