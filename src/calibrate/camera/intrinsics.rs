@@ -2,7 +2,7 @@
 //! residuals (\[zhang00\] section 3.2 and 3.3; docs/math.md, Camera calibration (7)).
 //! Frame and unit: pixels; board and camera frames in mm.
 
-use super::bundle::{Corner, State};
+use super::bundle::{Bent, Corner, State};
 use super::choice::{by_evidence, by_families, by_shape, resized, shaped};
 use super::fit::Fit;
 use super::lens::Lens;
@@ -101,6 +101,8 @@ pub struct Solved {
     pub iterations: usize,
     /// Whether it is a minimum.
     pub end: End,
+    /// What is believed of the board's shape.
+    bent: Option<Bent>,
 }
 
 impl Solved {
@@ -162,6 +164,25 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
         return Err(unsolved());
     }
     Ok(finish(&fit, solution, end, held))
+}
+
+/// The same camera from some of its pictures, with what was chosen from all of them.
+pub(super) fn without(
+    solved: &Solved,
+    pictures: &[Observation],
+    out: impl Fn(usize) -> bool,
+    options: &SolveOptions,
+) -> Option<(Intrinsics, Option<Shape>)> {
+    let others: Vec<usize> = (0..pictures.len()).filter(|&i| !out(i)).collect();
+    let corners: Vec<Vec<Corner>> = others.iter().map(|&i| measured(&pictures[i], options.weigh)).collect();
+    let fit = Fit { corners: &corners, like: &solved.intrinsics, loss: options.loss, bent: solved.bent };
+    let start = State {
+        camera: solved.intrinsics.parameters(),
+        shape: solved.shape.as_ref().map_or(Vec::new(), |s| s.coefficients.clone()),
+        poses: others.iter().map(|&i| solved.camera_from_board[i]).collect(),
+    };
+    let found = fit.rough(&solved.held, start)?;
+    Some((fit.camera(&found), fit.shape(&found)))
 }
 
 fn unsolved() -> Fault {
@@ -226,6 +247,7 @@ fn finish(fit: &Fit<'_>, solution: Solution<State>, end: End, held: Vec<usize>) 
         shape,
         camera_from_board: solution.state.poses.clone(),
         covariance: belief.map(|b| b.0),
+        bent: fit.bent,
         repeat: belief.map_or(Parameters::repeat(1.0), |b| b.1),
         held,
         residuals,

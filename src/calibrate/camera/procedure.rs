@@ -108,9 +108,7 @@ pub fn from_observations(
     let agreed = agree(pictures, left_out, [width, height], &options.solve)?;
     let Agreed { pictures, solved, .. } = &agreed;
     let hold_out_px = if pictures.len() > 2 {
-        // Whether the board is as drawn is a matter of the board, not of the picture that is held out.
-        let boards = if solved.shape.is_some() { Boards::Shaped } else { Boards::Drawn };
-        quality::hold_out(pictures, width, height, &SolveOptions { boards, ..options.solve.clone() })
+        quality::hold_out(pictures, solved, &options.solve)
     } else {
         vec![None; pictures.len()]
     };
