@@ -119,8 +119,8 @@ pub fn from_observations(
     Ok(CameraResult { calibration, used: pictures, solved, left_out, hold_out_px, worst })
 }
 
-/// Solves, and sets aside what does not fit: a few pictures of another readout, and one picture at a time, the worst first, because a wrong one bends the
-/// others' residuals too.
+/// Solves, and sets aside what does not fit: a few pictures of another readout, and one picture at a time, the worst
+/// first, because a wrong one bends the others' residuals too.
 fn agree(
     mut pictures: Vec<Observation>,
     mut left_out: Vec<(String, String)>,

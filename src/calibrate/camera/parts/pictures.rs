@@ -12,7 +12,8 @@ use crate::solve::{Loss, robust_scale};
 
 pub type Pose = Rigid<Camera, Board>;
 
-/// Usual size of a coefficient of the board's shape, over half of the board's length: more than print and plate are off.
+/// Usual size of a coefficient of the board's shape, over half of the board's length: more than print and plate are
+/// off.
 const USUAL_SHAPE: f64 = 0.01;
 
 /// All pictures, and what is free: the camera's numbers that were estimated, and the board's shape where all pictures

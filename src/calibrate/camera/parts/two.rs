@@ -164,8 +164,8 @@ impl Two {
     }
 
     /// By how much more the change's numbers scatter from picture to picture than corners that err by themselves would
-    /// make them (a factor on variances, 1 and more), and how many squares tell that. All of a camera's numbers tell it;
-    /// where the change's own scatter more, they do.
+    /// make them (a factor on variances, 1 and more), and how many squares tell that. All of a camera's numbers tell
+    /// it; where the change's own scatter more, they do.
     pub fn scatter(&self, set: &Set) -> Option<(f64, f64)> {
         let designs = self.designs(set);
         let inverse = self.information(set, &designs).cholesky()?.inverse();
