@@ -11,7 +11,7 @@ export const TABLE = {
   "A camera of": ["Eine Kamera mit", "相机", "カメラ"],
   "A station is its folder: settings, calibrations, recipes and jobs. Copy it while the program is ended.":
     [
-      "Die Station ist ein Ordner: Einstellungen, Kalibrierungen, Rezepte, Aufträge. Nur bei beendetem Programm kopieren.",
+      "Ein Ordner mit Einstellungen, Kalibrierungen, Rezepten, Aufträgen. Vor dem Kopieren das Programm beenden.",
       "工作站就是它的文件夹：设置、标定、配方和任务。请在程序结束后复制。",
       "ステーションはフォルダーそのものです：設定、校正、レシピ、ジョブ。プログラム終了中にコピーしてください。"
     ],
