@@ -145,7 +145,8 @@ pub fn xyz(object: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {
 /// Anything that numpy makes an array of numbers of.
 pub fn as_floats<'py>(object: &Bound<'py, PyAny>, wanted: &str) -> PyResult<Bound<'py, numpy::PyArrayDyn<f64>>> {
     let numpy = object.py().import("numpy")?;
-    let complex = numpy.call_method1("iscomplexobj", (object,))?.is_truthy()?;
+    // What is no array at all is said below.
+    let complex = numpy.call_method1("iscomplexobj", (object,)).and_then(|c| c.is_truthy()).unwrap_or(false);
     if complex || object.hasattr("mask")? {
         let is = if complex { "complex" } else { "masked" };
         return Err(raised(
