@@ -6,7 +6,6 @@ pub mod ball;
 pub mod boards;
 pub mod camera;
 pub mod components;
-pub mod flipped;
 pub mod hand_eye;
 pub mod homography;
 pub mod joint;

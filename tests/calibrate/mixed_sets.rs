@@ -8,11 +8,9 @@ use rand_pcg::Pcg64;
 use sheetlight::calibrate::camera::intrinsics::{Observation, SolveOptions, solve};
 use sheetlight::calibrate::camera::parts::apart;
 use sheetlight::calibrate::camera::procedure::{CameraOptions, calibrate, from_observations};
-use sheetlight::calibrate::flipped::flipped;
-use sheetlight::calibrate::measured_pose::{MeasuredPose, intrinsic_covariance, measure_view};
-use sheetlight::camera::{Flip, Intrinsics};
+use sheetlight::camera::Intrinsics;
 use sheetlight::geometry::{Vec2, Vec3};
-use sheetlight::recording::BoardSpec;
+use sheetlight::recording::Recording;
 use std::sync::Arc;
 
 const KINDS: [&str; 5] = ["turned by 180", "mirrored left", "mirrored upside", "region", "focal length"];
@@ -151,40 +149,46 @@ fn right_sets_are_never_accused() {
 #[test]
 fn photographs_half_of_which_are_turned_are_refused() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/half_turned");
-    let recording = sheetlight::recording::Recording::open(&folder).unwrap();
+    let recording = Recording::open(&folder).unwrap();
     let fault = calibrate(&[recording], &CameraOptions::default(), &|_, _| ()).unwrap_err();
     assert!(fault.what.contains("turned by 180 degrees"), "{fault}");
     assert!(fault.what.starts_with("5 of 10 pictures"), "{fault}");
 }
 
-/// Boards before a camera that is calibrated: turned pictures of them are named, right ones are not.
+/// A real stereo pair's photographs in one set: those of the other camera are named, all of them and no others.
 #[test]
-fn boards_tell_pictures_that_were_turned_against_the_calibration() {
-    let board =
-        BoardSpec::Chessboard { inner_corners: [9, 6], square_mm: 15.0, border_mm: 9.0, first_square: "black".into() };
-    for k in 0..9 {
-        let mut s = random_station(80_000 + k);
-        s.sigma_px = s.sigma_px.min(0.1);
-        let [w, h] = [s.camera.width, s.camera.height];
-        let known = from_observations(seen(&s, k), vec![], w, h, &CameraOptions::default()).unwrap().calibration;
-        let belief = intrinsic_covariance(&known.covariance).unwrap();
-        let told = |turned: usize| {
-            let mut pictures = seen(&s, 100 + k);
-            for p in pictures[..turned].iter_mut().flat_map(|o| &mut o.view.points) {
-                p.pixel = Vec2::new(f64::from(w) - 1.0 - p.pixel.x, f64::from(h) - 1.0 - p.pixel.y);
-            }
-            let pose = |o: &Observation| measure_view(&o.name, &known.value, &board, &o.view).unwrap();
-            let poses: Vec<MeasuredPose> = pictures.iter().map(pose).collect();
-            flipped(&poses.iter().collect::<Vec<_>>(), &known.value, &belief)
-        };
-        assert_eq!(told(0), None, "{k}: right pictures were accused");
-        if matters(&s, 0) {
-            for turned in [3, s.poses.len()] {
-                let (which, flip) = told(turned).expect("turned pictures are told");
-                // A board in the picture's middle tells nothing.
-                let right = which.iter().all(|i| *i < turned) && 4 * which.len() >= 3 * turned;
-                assert!(flip == Flip::Turned && right, "{k}: {turned} turned, named {which:?}");
-            }
-        }
+fn photographs_of_two_cameras_in_one_set_are_told_apart() {
+    let Some(reference) = crate::common::reference("photographs_of_two_cameras_in_one_set_are_told_apart") else {
+        return;
+    };
+    let photographs = reference.join("camera/opencv_chessboard");
+    let all = |side: &str| [1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 12, 13, 14].map(|k| format!("{side}{k:02}.jpg")).to_vec();
+    let (left, right) = (all("left"), all("right"));
+    let calibrated = |names: &[String]| {
+        let folder = tempfile::tempdir().unwrap();
+        names.iter().for_each(|n| {
+            std::fs::copy(photographs.join(n), folder.path().join(n)).unwrap();
+        });
+        let frames: Vec<_> = names.iter().map(|n| serde_json::json!({ "ambient": n })).collect();
+        let meta = serde_json::json!({
+            "format": 1, "set": "two cameras", "units": "mm", "frames": frames,
+            "image": { "width": 640, "height": 480, "bits": 8, "channels": 1, "response": "linear",
+                       "pixel_centre": "integer coordinates" },
+            "board": { "type": "chessboard", "inner_corners": [9, 6], "square_mm": 25.0, "border_mm": 10.0,
+                       "first_square": "black" },
+        });
+        std::fs::write(folder.path().join("meta.json"), meta.to_string()).unwrap();
+        let recording = Recording::open(folder.path()).unwrap();
+        calibrate(&[recording], &CameraOptions::default(), &|_, _| ())
+    };
+    for alone in [&left, &right] {
+        assert_eq!(calibrated(alone).unwrap().left_out, [], "photographs of one camera were accused");
     }
+    let few = calibrated(&[&left[..], &right[..3]].concat()).unwrap();
+    let mut named: Vec<&String> = few.left_out.iter().map(|(name, _)| name).collect();
+    named.sort();
+    assert_eq!(named, right[..3].iter().collect::<Vec<_>>(), "{:?}", few.left_out);
+    assert!(few.left_out.iter().all(|(_, why)| why.contains("another camera")), "{:?}", few.left_out);
+    let half = calibrated(&[&left[..7], &right[7..]].concat()).unwrap_err();
+    assert!(half.what.starts_with("6 of 13 pictures") && half.what.contains("another camera"), "{half}");
 }

@@ -17,4 +17,7 @@ export type Done<P> = Omit<Job, "order" | "outcome"> & {
 };
 
 /** A job of any procedure. */
-export type AnyJob = Omit<Job, "order" | "outcome"> & { order: Loose<Order> & { procedure: string }; outcome: Loose<Outcome> };
+export type AnyJob = Omit<Job, "order" | "outcome"> & {
+  order: Loose<Order> & { procedure: string };
+  outcome: Loose<Outcome>;
+};

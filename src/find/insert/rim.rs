@@ -10,8 +10,8 @@ use crate::find::measure::points::Ordered;
 use crate::find::measure::pose::measure;
 use crate::find::model::edge_index::EdgeIndex;
 use crate::find::search::full::Match;
-use crate::geometry::{Base, Part, Rigid, Vec2, Vec3};
-use crate::scan::HeightMap;
+use crate::geometry::{Vec2, Vec3};
+use crate::scan::{Along, HeightMap};
 
 /// A part of which less than this share of the drawn edges was scanned is not recognised by them.
 const LEAST_SEEN: f64 = 0.3;
@@ -19,8 +19,12 @@ const LEAST_SEEN: f64 = 0.3;
 const LEAST_BEYOND: f64 = 0.02;
 /// Share of the edges within the scan at which a surface has to end, for the part to be believed there.
 const LEAST_ENDED: f64 = 0.5;
-/// So many places are measured.
+/// Number of poses that are measured, the best first.
 const PLACES: usize = 8;
+/// Width of the surroundings that the sweep has to hold too, because the part is judged by them, in units of the recipe.
+const MARGIN: f64 = 3.0;
+/// Share of the points that may lie past the rim that is taken.
+const STRAY: f64 = 0.001;
 
 /// A part that was scanned in part.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -55,8 +59,8 @@ impl CutOff {
     }
 }
 
-/// The pose, of some, at which what was scanned agrees best with the part, where the part goes on beyond the rim
-/// there. `None`: no pose that reaches beyond the rim agrees with the points.
+/// How the part goes on beyond the rim at the match that agrees best with the points inside. `None`: no match reaches
+/// beyond the rim and agrees with the points.
 pub(super) fn cut_off(points: &Ordered, map: &HeightMap, recipe: &Recipe, matches: &[Match]) -> Option<CutOff> {
     let drawing = recipe.drawing();
     let edges = EdgeIndex::new(&drawing, recipe.measure.unit());
@@ -67,7 +71,8 @@ pub(super) fn cut_off(points: &Ordered, map: &HeightMap, recipe: &Recipe, matche
     for pose in poses.take(PLACES) {
         let start = lift(&pose, map, points, recipe);
         let Ok(measured) = measure(points, &drawing, start, &recipe.measure) else { continue };
-        let place = |x: f64, y: f64, z: f64| flat(map, &measured.base_from_part, x, y, z);
+        let grid_from_part = map.base_from_grid.inverse() * measured.base_from_part;
+        let place = |x: f64, y: f64, z: f64| grid_from_part.point(&Vec3::new(x, y, z)).xy();
         let places: Vec<Vec2> = samples.iter().map(|s| place(s.x, s.y, s.z)).collect();
         let beyond = places.iter().filter(|p| area.outside(p).0 > map.cell).count() as f64 / places.len() as f64;
         if !(LEAST_BEYOND..=1.0 - LEAST_SEEN).contains(&beyond) {
@@ -89,18 +94,9 @@ pub(super) fn cut_off(points: &Ordered, map: &HeightMap, recipe: &Recipe, matche
     best.map(|b| b.1)
 }
 
-/// Around the part this much is scanned too: its surroundings are judged. In units of the recipe.
-const MARGIN: f64 = 3.0;
-
-/// A place of the part in the plane of the map's grid.
-fn flat(map: &HeightMap, base_from_part: &Rigid<Base, Part>, x: f64, y: f64, z: f64) -> Vec2 {
-    let p = map.base_from_grid.inverse().point(&base_from_part.point(&Vec3::new(x, y, z)));
-    Vec2::new(p.x, p.y)
-}
-
 /// One of the two ways in which a scan grows: from shot to shot, or along the stripe.
 struct Way {
-    /// Across the lines on which the number is the same, unit length, towards larger numbers.
+    /// Unit vector towards larger numbers, across the lines of equal number.
     towards: Vec2,
     /// The smallest and the largest value of `towards · place`, mm.
     ends: [f64; 2],
@@ -117,18 +113,9 @@ impl Area {
         let grid_from_base = map.base_from_grid.inverse();
         let places: Vec<Vec2> = points.points.iter().map(|p| grid_from_base.point(p).xy()).collect();
         let number = |all: &[u32]| all.iter().map(|n| f64::from(*n)).collect::<Vec<_>>();
-        // Columns are pixels along the stripe: of which axis of the picture?
-        let along_u = points.pixel.iter().zip(&points.column).take(1000).collect::<Vec<_>>();
-        let apart = |k: usize| {
-            let steps = along_u
-                .windows(2)
-                .map(|w| f64::from(w[1].0[k] - w[0].0[k]) - (f64::from(*w[1].1) - f64::from(*w[0].1)));
-            steps.map(f64::abs).sum::<f64>()
-        };
-        let picture = if apart(0) < apart(1) {
-            ["the picture's left edge", "the picture's right edge"]
-        } else {
-            ["the picture's upper edge", "the picture's lower edge"]
+        let picture = match points.along {
+            Along::U => ["the picture's left edge", "the picture's right edge"],
+            Along::V => ["the picture's upper edge", "the picture's lower edge"],
         };
         Some(Area([
             Way::of(&places, &number(&points.row), ["the first shot", "the last shot"])?,
@@ -145,8 +132,8 @@ impl Area {
         ends.max_by(|a, b| a.0.total_cmp(&b.0)).expect("four sides")
     }
 
-    /// By how much the area has to move so that it holds places with a margin; its middle goes to theirs where it is
-    /// too small.
+    /// The shortest move after which the area holds the places with a margin. An area that is too small is centred on
+    /// them.
     fn move_to_hold(&self, places: &[Vec2], margin: f64) -> Vec2 {
         let by = [0, 1].map(|k| {
             let way = &self.0[k];
@@ -161,7 +148,7 @@ impl Area {
 }
 
 impl Way {
-    /// From a number of each place that grows evenly over the plane: its slope by least squares.
+    /// From the shot or column of each place: its slope over the plane by least squares.
     fn of(places: &[Vec2], numbers: &[f64], sides: [&'static str; 2]) -> Option<Way> {
         let n = places.len() as f64;
         let (middle, mean) = (places.iter().sum::<Vec2>() / n, numbers.iter().sum::<f64>() / n);
@@ -174,14 +161,11 @@ impl Way {
         let towards = (spread.try_inverse()? * grows).try_normalize(1e-12)?;
         let mut at: Vec<f64> = places.iter().map(|p| towards.dot(p)).collect();
         at.sort_by(f64::total_cmp);
-        // A few stray points are no rim.
+        // A few stray points do not make the rim.
         let end = |share: f64| at[(share * (at.len() - 1) as f64).round() as usize];
         Some(Way { towards, ends: [end(STRAY), end(1.0 - STRAY)], sides })
     }
 }
-
-/// Share of the points that may lie past the rim that is taken.
-const STRAY: f64 = 0.001;
 
 #[cfg(test)]
 mod tests {

@@ -1,8 +1,8 @@
 //! How likely chance alone explains a gain.
 
-/// Logarithm of the probability that so many numbers of no use take `gain` off a sum of squares whose scale was
-/// estimated from `freedom` squares: the tail of Fisher's distribution, for the next even count of numbers, where it
-/// has a closed form and is never below the true one.
+/// Logarithm of the probability that `numbers` useless parameters lower a sum of squares by `gain`, in units of a
+/// variance that was estimated from `freedom` squares. It is the tail of Fisher's F distribution. An odd count is
+/// rounded up: even counts have a closed form, and the larger count's tail is never the smaller one.
 pub fn ln_tail(gain: f64, numbers: usize, freedom: f64) -> f64 {
     let rest = freedom / (freedom + gain.max(0.0));
     let (mut term, mut sum) = (1.0, 1.0);

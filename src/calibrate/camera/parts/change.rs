@@ -21,8 +21,8 @@ pub enum Kind {
 /// The kinds whose numbers are chosen; flips have none.
 pub const FREE: [Kind; 3] = [Kind::Focus, Kind::Region, Kind::Camera];
 
-/// Smaller changes are told of no camera: what a model does not say of a lens differs by as much from near boards to
-/// far ones, and a lens that warms up moves by as much.
+/// Smaller changes are not reported. A lens that warms up moves by as much, and so does what the lens model leaves out
+/// between near and far boards.
 const LEAST_PX: f64 = 1.5;
 const LEAST_FOCUS: f64 = 0.003;
 
@@ -41,7 +41,7 @@ impl Kind {
         DMatrix::from_fn(PARAMETERS, columns.len(), |row, c| columns[c][row])
     }
 
-    /// What a flip is compared by, whose numbers are none.
+    /// The kind by whose parameters the scatter is measured: a flip has none and takes those of a region.
     pub fn compared(self) -> Kind {
         if matches!(self, Kind::Flip(_)) { Kind::Region } else { self }
     }
@@ -88,16 +88,10 @@ impl Kind {
             Kind::Same => "as the others".into(),
             Kind::Flip(flip) => flip.words().into(),
             Kind::Focus => format!("of a focal length that is {length}"),
-            Kind::Region => {
-                format!(
-                    "of a region of the sensor that begins {:.1} px further right and {:.1} px further down",
-                    -x, -y
-                )
+            Kind::Region => format!("of a region of the sensor that begins {}", further(-x, -y)),
+            Kind::Camera => {
+                format!("of another camera: its focal length is {length}, its principal point lies {}", further(x, y))
             }
-            Kind::Camera => format!(
-                "of another camera: its focal length is {length}, its principal point {x:.1} px further right and \
-                 {y:.1} px further down"
-            ),
         }
     }
 
@@ -115,9 +109,22 @@ impl Kind {
     }
 }
 
+/// A shift in the picture, in words.
+fn further(x: f64, y: f64) -> String {
+    let side =
+        |v: f64, [less, more]: [&str; 2]| format!("{:.1} px further {}", v.abs(), if v < 0.0 { less } else { more });
+    format!("{} and {}", side(x, ["left", "right"]), side(y, ["up", "down"]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn shifts_are_said_towards_their_side() {
+        assert_eq!(further(-17.7, 14.25), "17.7 px further left and 14.2 px further down");
+        assert_eq!(further(3.0, -0.5), "3.0 px further right and 0.5 px further up");
+    }
 
     #[test]
     fn signs_are_the_flips_derivatives() {

@@ -163,9 +163,9 @@ impl Two {
         seen + usual.sum::<f64>()
     }
 
-    /// By how much more the change's numbers scatter from picture to picture than corners that err by themselves would
-    /// make them (a factor on variances, 1 and more), and how many squares tell that. All of a camera's numbers tell
-    /// it; where the change's own scatter more, they do.
+    /// The factor, 1 or more, by which the pictures' pulls on the change scatter beyond independent errors of the
+    /// corners (a ratio of variances), and the number of squares that it is estimated from. It is the larger of two
+    /// estimates: from the change's own parameters, and from all three of a camera's.
     pub fn scatter(&self, set: &Set) -> Option<(f64, f64)> {
         let designs = self.designs(set);
         let inverse = self.information(set, &designs).cholesky()?.inverse();
