@@ -21,7 +21,7 @@ const LEAST_BEYOND: f64 = 0.02;
 const LEAST_ENDED: f64 = 0.5;
 /// Number of poses that are measured, the best first.
 const PLACES: usize = 8;
-/// Width of the surroundings that the sweep has to hold too, because the part is judged by them, in units of the recipe.
+/// Width of the surroundings that the sweep has to hold too, in units of the recipe: the part is judged by them.
 const MARGIN: f64 = 3.0;
 /// Share of the points that may lie past the rim that is taken.
 const STRAY: f64 = 0.001;
@@ -170,6 +170,7 @@ impl Way {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scan::{CloudPoint, GridOptions, Shots, grid};
 
     /// Scanned from x = 0 to 20 and y = 0 to 10.
     fn area() -> Area {
@@ -190,6 +191,33 @@ mod tests {
         assert_eq!(area().move_to_hold(&part, 1.0), Vec2::new(5.0, 0.5));
         assert_eq!(area().move_to_hold(&[Vec2::new(10.0, 5.0)], 1.0), Vec2::zeros());
         assert_eq!(area().move_to_hold(&[Vec2::new(0.0, 5.0), Vec2::new(30.0, 5.0)], 0.0), Vec2::new(5.0, 0.0));
+    }
+
+    /// Stripes that lie and stripes that stand: shots and the picture's sides are named as the camera saw them.
+    #[test]
+    fn sides_are_named_by_the_stripes_axis_of_the_picture() {
+        for (along, before, past) in [
+            (Along::U, "the picture's left edge", "the picture's right edge"),
+            (Along::V, "the picture's upper edge", "the picture's lower edge"),
+        ] {
+            let mut cloud = Vec::new();
+            for shot in 0..40u32 {
+                for column in 0..60u32 {
+                    let position = glam::Vec3::new(0.2 * shot as f32, 0.2 * column as f32, 0.0);
+                    let (u, v) = if along == Along::U { (column as f32, 9.0) } else { (9.0, column as f32) };
+                    cloud.push(CloudPoint { position, sigma_mm: 0.02, intensity: 9.0, quality: 1.0, shot, u, v });
+                }
+            }
+            let points = Ordered::new(&cloud, &Shots::unplaced(along)).unwrap();
+            let map = grid(&cloud, &GridOptions { cell: Some(0.2), ..GridOptions::default() }).unwrap();
+            let area = Area::of(&points, &map).unwrap();
+            let side = |x: f64, y: f64| {
+                let p = map.base_from_grid.inverse().point(&Vec3::new(x, y, 0.0));
+                area.outside(&p.xy()).1
+            };
+            assert_eq!((side(4.0, -3.0), side(4.0, 15.0)), (before, past));
+            assert_eq!((side(-3.0, 6.0), side(11.0, 6.0)), ("the first shot", "the last shot"));
+        }
     }
 
     #[test]
