@@ -9,7 +9,7 @@ VENV := .venv
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 export XDG_RUNTIME_DIR ?= $(shell mktemp -d /tmp/sheetlight-run.XXXXXX)
 
-.PHONY: station browser demo lint test bench bench-peers vulkan python cameras build clean
+.PHONY: station browser demo pages lint test bench bench-peers vulkan python notebooks cameras build clean
 
 demo: vulkan build
 	$(TARGET)/release/sheetlight demo --out demo
@@ -25,7 +25,11 @@ test: vulkan python cameras browser lint
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(CARGO) test --locked -- --show-output
 
 # A toolchain without clippy says so and goes on.
-lint:
+# The pages of the screen: format and types.
+pages:
+	tools/pages.sh
+
+lint: pages
 	if $(CARGO) clippy --version >/dev/null 2>&1; then \
 		$(CARGO) clippy --locked --all-targets -- -D warnings; \
 	else echo "clippy is not installed: skipped"; fi
@@ -57,9 +61,14 @@ cameras:
 	tools/cameras.sh
 
 # The scorer of the reference data and the comparisons need numpy, scipy and libigl. The Python package needs maturin,
-# mypy and pytest.
+# mypy and pytest; its files and notebooks need what other programs read and show them with.
 python:
 	tools/python-env.sh $(VENV) test
+	tools/python-env.sh $(VENV) files
+
+# The figures of docs/python.md: the last one of each notebook, with the installed Python package.
+notebooks:
+	$(VENV)/bin/python python/notebooks/run.py --pictures docs/images
 
 clean:
 	$(CARGO) clean

@@ -33,6 +33,7 @@ fn files(endings: &[&str]) -> Vec<(String, String)> {
             if entry.file_type().expect("a file has a type").is_dir() {
                 // Folders that a build, a demo or a person makes are not the repository's.
                 let made = folder == root() && ["target", "demo", "demo-cell"].contains(&name.as_str());
+                let made = made || name == "node_modules";
                 if !name.starts_with('.') && !made {
                     open.push(path);
                 }

@@ -24,24 +24,30 @@ use sheetlight::station::{Checkpoint, Settings, Sigmas, Values, load_report};
 use std::path::{Path, PathBuf};
 
 const META: &str = r#"{"format": 1, "set": "a", "units": "mm", "beam": "line", "pose_file": "poses",
- "image": {"width": 640, "height": 480, "bits": 8, "channels": 1, "response": "linear", "pixel_centre": "integer coordinates"},
- "boards": [{"type": "chessboard", "inner_corners": [9, 6], "square_mm": 10.0, "border_mm": 7.0, "first_square": "black"}],
+ "image": {"width": 640, "height": 480, "bits": 8, "channels": 1, "response": "linear",
+  "pixel_centre": "integer coordinates"},
+ "boards": [{"type": "chessboard", "inner_corners": [9, 6], "square_mm": 10.0, "border_mm": 7.0,
+  "first_square": "black"}],
  "frames": [{"board": 0, "ambient": "a.png", "laser": "l.png", "pose": 0}]}"#;
 const POSES_CSV: &str = "# convention: denso\nframe,x,y,z,rx,ry,rz\n0,1,2,3,4,5,6\n1,-1e2,2.5,3,180,0,90\n";
-const POSES_JSON: &str = r#"{"units":"mm","layout":"row-major 4x4","transform":"base_T_flange","poses":[{"frame":0,"matrix":[1,0,0,1,0,1,0,2,0,0,1,3,0,0,0,1]}]}"#;
-const STATION: &str = "name = 'cell'\nrobot = 'denso'\n[working_volume]\nnear_mm = 60.0\nfar_mm = 320.0\n[extraction.threshold]\nsize = 31\noffset = 5\n";
+const POSES_JSON: &str = r#"{"units":"mm","layout":"row-major 4x4","transform":"base_T_flange",
+ "poses":[{"frame":0,"matrix":[1,0,0,1,0,1,0,2,0,0,1,3,0,0,0,1]}]}"#;
+const STATION: &str = include_str!("data/fuzz/station.toml");
 const VALUES: &str = r#"{"intrinsics": {"fx": 611.6, "fy": 611.6, "cx": 315, "cy": 232, "width": 640, "height": 480,
  "distortion_k1_k2_p1_p2_k3": [0, 0, 0, 0, 0]}, "flange_T_camera": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
- "laser_plane_camera": {"normal": [0, 0.883, 0.469], "offset_mm": 72}, "pointer_camera": {"origin": [1, 2, 3], "direction": [0, 0.6, 0.8]}}"#;
-const DRAWING: &str = "[[shape]]\nkind = 'rectangle'\ncentre = [0, 0]\nsize = [20, 10]\n[[shape]]\nkind = 'circle'\nname = 'hole'\ncentre = [1, 0]\nradius = 0.5\ninside = 'low'\ngrid = { count = [4, 2], pitch = [3, 6] }\n[[shape]]\nkind = 'polygon'\npoints = [[0, 0], [3, 1], [2, 4]]\nz_mm = 2.5\n[[shape]]\nkind = 'arc'\ncentre = [0, 0]\nradius = 5\nspan_deg = [0, 90]\n";
-const DXF: &str = "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n0\nSECTION\n2\nBLOCKS\n0\nBLOCK\n2\nA\n10\n0\n20\n0\n0\nCIRCLE\n10\n0\n20\n0\n40\n1\n0\nENDBLK\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n0\nLWPOLYLINE\n90\n4\n70\n1\n10\n0\n20\n0\n42\n0.5\n10\n30\n20\n0\n10\n30\n20\n20\n10\n0\n20\n20\n0\nINSERT\n2\nA\n10\n9\n20\n9\n41\n1\n42\n1\n50\n30\n70\n2\n71\n2\n44\n4\n45\n4\n0\nARC\n10\n5\n20\n5\n40\n2\n50\n0\n51\n270\n0\nELLIPSE\n10\n15\n20\n10\n11\n3\n21\n0\n40\n0.5\n41\n0\n42\n6.283185\n0\nSPLINE\n70\n8\n71\n3\n72\n8\n73\n4\n40\n0\n40\n0\n40\n0\n40\n0\n40\n1\n40\n1\n40\n1\n40\n1\n10\n1\n20\n1\n10\n2\n20\n3\n10\n4\n20\n3\n10\n5\n20\n1\n0\nENDSEC\n0\nEOF\n";
-const LISTING: &str = "/PROG  BALL\n/MN\n   1:J P[1] 100% FINE    ;\n/POS\nP[1]{\n   GP1:\n\tUF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX =   500.125  mm,\tY =   -20.500  mm,\tZ =   300.000  mm,\n\tW =   180.000 deg,\tP =    10.000 deg,\tR =   -90.000 deg\n};\nP[2:\"over the ball\"]{\n   GP1:\n\tUF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX =  1.0  mm,\tY =  2.0  mm,\tZ =  3.0  mm,\n\tW =  0.0 deg,\tP =  0.0 deg,\tR =  90.0 deg\n};\n/END\n";
+ "laser_plane_camera": {"normal": [0, 0.883, 0.469], "offset_mm": 72},
+ "pointer_camera": {"origin": [1, 2, 3], "direction": [0, 0.6, 0.8]}}"#;
+const DRAWING: &str = include_str!("data/fuzz/drawing.toml");
+const DXF: &str = include_str!("data/fuzz/part.dxf");
+const LISTING: &str = include_str!("data/fuzz/poses.ls");
 const BOARDS: [&str; 5] = [
     r#"{"type": "chessboard", "inner_corners": [9, 6], "square_mm": 10.0, "border_mm": 7.0, "first_square": "black"}"#,
     r#"{"type": "charuco", "squares": [7, 5], "square_mm": 10.0, "marker_mm": 7.5, "dictionary": "DICT_4X4_50"}"#,
     r#"{"type": "circles", "dots": [7, 5], "pitch_mm": 10.0, "diameter_mm": 5.0, "asymmetric": true}"#,
-    r#"{"type": "marker_grid", "markers": [5, 7], "marker_mm": 20.0, "gap_mm": 5.0, "dictionary": "DICT_APRILTAG_36h11", "first_id": 3}"#,
-    r#"{"type": "marker_grid", "markers": [1, 1], "marker_mm": 80.0, "gap_mm": 0.0, "dictionary": "DICT_4X4_50", "first_id": 49}"#,
+    r#"{"type": "marker_grid", "markers": [5, 7], "marker_mm": 20.0, "gap_mm": 5.0,
+     "dictionary": "DICT_APRILTAG_36h11", "first_id": 3}"#,
+    r#"{"type": "marker_grid", "markers": [1, 1], "marker_mm": 80.0, "gap_mm": 0.0,
+     "dictionary": "DICT_4X4_50", "first_id": 49}"#,
 ];
 const BOARD_POSES: &str =
     "# transform: camera_T_board\n# convention: denso\nframe,x,y,z,rx,ry,rz\n0,1,2,300,4,5,6\n3,-10,2.5,280,180,0,90\n";
@@ -291,7 +297,8 @@ fn foreign_maps() {
         .replace("property uchar intensity", "property list uchar uchar seen\nobj_info of another program");
     let pcd = |data: &str| {
         format!(
-            "VERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 30\nHEIGHT 3\nPOINTS 90\nDATA {data}\n"
+            "VERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\n\
+             WIDTH 30\nHEIGHT 3\nPOINTS 90\nDATA {data}\n"
         )
     };
     let place = |i: usize| [(i % 30) as f32, (i / 30) as f32, 0.1 * (i % 4) as f32];

@@ -5,6 +5,7 @@
 mod common;
 
 use common::sheetlight;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
@@ -201,7 +202,7 @@ fn own_words(script: &str) -> Vec<String> {
             continue;
         }
         let (mut depth, mut quoted, mut chosen) = (1, None::<String>, false);
-        let call = &script[at + 2..];
+        let call = script[at + 2..].trim_start();
         let all = call.starts_with(['"', '{']);
         for c in call.chars() {
             match (&mut quoted, c) {
@@ -231,9 +232,9 @@ fn every_text_has_its_translations() {
     assert_eq!(read, ["a (b)", "e", "h"]);
     let pages = source("src/web/pages");
     let table = std::fs::read_to_string(pages.join("base/texts.js")).unwrap();
-    let rows: Vec<&str> = table.lines().filter(|l| l.starts_with("  \"")).collect();
-    let whole = |row: &&str| row.matches("\", \"").count() >= 2;
-    assert!(rows.len() > 500 && rows.iter().all(whole), "{:?}", rows.iter().find(|r| !whole(r)));
+    let table = &table[table.find('{').unwrap()..=table.rfind('}').unwrap()];
+    let rows: BTreeMap<String, [String; 3]> = serde_json::from_str(table).unwrap();
+    assert!(rows.len() > 500, "{}", rows.len());
     let scripts = ["base", "pages", "widgets", "widgets/view", "widgets/rig", "widgets/part"];
     let scripts = scripts.map(|f| std::fs::read_dir(pages.join(f)).unwrap());
     let mut missing = Vec::new();
@@ -241,8 +242,7 @@ fn every_text_has_its_translations() {
         scripts.into_iter().flatten().map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "js"))
     {
         let words = own_words(&std::fs::read_to_string(&path).unwrap());
-        let known = |w: &String| rows.iter().any(|r| r.starts_with(&format!("  \"{w}\": [")));
-        missing.extend(words.into_iter().filter(|w| !known(w)).map(|w| format!("{}: {w}", path.display())));
+        missing.extend(words.into_iter().filter(|w| !rows.contains_key(w)).map(|w| format!("{}: {w}", path.display())));
     }
     assert!(missing.is_empty(), "{missing:#?}");
 }

@@ -1,12 +1,16 @@
 #!/usr/bin/env bash
-# Makes a Python environment with a set of packages (test, peers) in a folder: for judges, peers and the tests of the
-# Python package. Sheetlight itself never needs Python; without one the tests that need it say that they were skipped.
+# Makes a Python environment with a set of packages (test, files, peers) in a folder: for judges, peers and the tests of
+# the Python package. `files` has what its files, conversions and notebooks need and are read again with: 0.6 GB, half
+# of them OpenCV and Arrow. Sheetlight itself never needs Python; without one the tests that need it say that they were
+# skipped.
 set -eu
 folder=$1 set=$2
 case $set in
   test) packages="numpy scipy libigl maturin==1.* mypy pytest" ;;
+  files) packages="laspy[lazrs] matplotlib opencv-contrib-python-headless==4.14.* pyarrow pye57 pypcd4 tifffile"
+    packages="$packages trimesh xarray" ;;
   peers) packages="numpy scipy numba opencv-contrib-python-headless==4.14.*" ;;
-  *) echo "python-env.sh: unknown set '$set': test or peers" >&2; exit 2 ;;
+  *) echo "python-env.sh: unknown set '$set': test, files or peers" >&2; exit 2 ;;
 esac
 # Holds the packages, so that an environment of a former version gets what is new.
 stamp="$folder/.has-$set"

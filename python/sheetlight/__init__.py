@@ -5,6 +5,7 @@ of one frame to another.
 Everything that cannot be done raises `SheetlightError`, which says what happened, why, and what to do next.
 """
 
+from ._convert import log_to_rerun, to_open3d, to_trimesh, to_xarray
 from ._dtypes import PICTURE_POINT, POINT, xyz
 from ._engine import (
     Calibration,
@@ -33,6 +34,8 @@ from ._engine import (
     teach,
 )
 from ._error import SheetlightError
+from ._files.save import Saved, save
+from ._organise import Organised, organise
 
 __all__ = [
     "PICTURE_POINT",
@@ -42,8 +45,10 @@ __all__ = [
     "Found",
     "HeightMap",
     "Live",
+    "Organised",
     "Recipe",
     "Recording",
+    "Saved",
     "Scan",
     "SheetlightError",
     "Simulation",
@@ -54,13 +59,19 @@ __all__ = [
     "calibrate_hand_eye",
     "calibrate_laser_plane",
     "find",
+    "log_to_rerun",
     "match_template",
     "notations",
     "numbers_from_pose",
+    "organise",
     "picture_points",
     "pose_from_numbers",
+    "save",
     "scan",
     "simulate",
     "teach",
+    "to_open3d",
+    "to_trimesh",
+    "to_xarray",
     "xyz",
 ]

@@ -22,6 +22,12 @@ fn image(array: &Bound<'_, PyAny>, bits: Option<u8>) -> Result<Image> {
             .cause("a picture's file name or a list")
             .next("give an array of rows x columns, uint8 or uint16"));
     };
+    // Its levels under the mask would count like all others.
+    if array.hasattr("mask").unwrap_or(false) {
+        return Err(Fault::input(format!("is a {}: masks of pictures are not used", type_name(array)))
+            .cause("some of its pixels are marked as bad")
+            .next("give picture.filled(0): what is black is no stripe; or leave the picture out"));
+    }
     let shape = untyped.shape();
     let &[height, width] = shape else {
         return Err(Fault::input(format!("has the shape {shape:?}, rows x columns are needed"))
@@ -138,7 +144,18 @@ pub fn xyz(object: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {
 
 /// Anything that numpy makes an array of numbers of.
 pub fn as_floats<'py>(object: &Bound<'py, PyAny>, wanted: &str) -> PyResult<Bound<'py, numpy::PyArrayDyn<f64>>> {
-    let made = object.py().import("numpy")?.call_method1("asarray", (object, "f8"));
+    let numpy = object.py().import("numpy")?;
+    // What is no array at all is said below.
+    let complex = numpy.call_method1("iscomplexobj", (object,)).and_then(|c| c.is_truthy()).unwrap_or(false);
+    if complex || object.hasattr("mask")? {
+        let is = if complex { "complex" } else { "masked" };
+        return Err(raised(
+            Fault::input(format!("{wanted} are {is} numbers, real ones are needed"))
+                .cause("a calculation made them so, or another array was given")
+                .next("give an array of float64"),
+        ));
+    }
+    let made = numpy.call_method1("asarray", (object, "f8"));
     let array = made.and_then(|a| Ok(a.cast_into::<numpy::PyArrayDyn<f64>>()?));
     array.map_err(|error| {
         crate::fault::raised_by(error, |said| {

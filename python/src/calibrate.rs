@@ -35,8 +35,8 @@ fn recorded(object: &Bound<'_, PyAny>) -> PyResult<Recording> {
 ///
 /// `lens` is evidence (what the pictures determine), none, one, four, five, rational, prism, scheimpflug or all;
 /// `board` is evidence, drawn or shaped. The expected error is stated at the distance `working_mm`.
-/// `progress(done, all)` is called with the number of pictures. Ctrl-C takes effect when the calibration has ended. Raises SheetlightError
-/// for recordings without boards and for pictures of two sizes.
+/// `progress(done, all)` is called with the number of pictures. Ctrl-C takes effect when the calibration has ended.
+/// Raises SheetlightError for recordings without boards and for pictures of two sizes.
 #[pyfunction]
 #[pyo3(signature = (recordings, *, lens = "evidence", skew = false, board = "evidence", working_mm = None,
     progress = None))]

@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use sheetlight::fault::Fault;
 use sheetlight::geometry::{Base, Flange, Frame, ORTHONORMAL_WARN, Rigid};
+use sheetlight::recording::looks_like_metres;
 use sheetlight::robot::Convention;
 
 /// A pose: a 4 x 4 matrix (or what has `as_matrix`, as scipy's RigidTransform), or a pair of a rotation (3 x 3 or
@@ -71,7 +72,22 @@ pub fn poses(object: &Bound<'_, PyAny>) -> PyResult<Vec<Rigid<Base, Flange>>> {
                 .next("give an array of N x 4 x 4, or a list of poses")
         })
     })?;
-    all.enumerate().map(|(i, one)| pose(&one?, &format!("pose {i}"))).collect()
+    let one = |(i, one): (usize, PyResult<Bound<'_, PyAny>>)| {
+        let one = one.map_err(|error| {
+            raised_by(error, |said| {
+                Fault::input(format!("the poses ended at pose {i}: {said}"))
+                    .cause("the code that gives them raised an exception")
+                    .next("see the exception that this one names as its cause")
+            })
+        })?;
+        pose(&one, &format!("pose {i}"))
+    };
+    let poses = all.enumerate().map(one).collect::<PyResult<Vec<_>>>()?;
+    if let Some(said) = looks_like_metres(&poses) {
+        let kind = object.py().get_type::<pyo3::exceptions::PyUserWarning>();
+        object.py().import("warnings")?.call_method1("warn", (said, kind))?;
+    }
+    Ok(poses)
 }
 
 /// A 4 x 4 array.

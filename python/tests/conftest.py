@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import subprocess
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -54,3 +56,13 @@ def by_program(made, tmp_path_factory):
     arguments = ["scan", made.recording().folder, "--station", made.station.folder, "--out", out, "--on", "cpu"]
     subprocess.run([program, *map(str, arguments)], check=True, capture_output=True)
     return out
+
+
+def needs(name: str, *, heavy: bool = False) -> ModuleType:
+    """An optional package. A test without it is skipped and says so; on a build server only for heavy ones."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        if "CI" in os.environ and not heavy:
+            raise
+        pytest.skip(f"*** {name} is not installed: what uses it was not tested ({error}) ***")

@@ -37,15 +37,28 @@ def test_everything_says_what_it_is():
             assert thing.__doc__, name
 
 
-def test_the_types_are_those_of_the_code():
+@pytest.mark.parametrize("check", [["mypy.stubtest", "sheetlight"], ["mypy", "--strict", "-p", "sheetlight"]])
+def test_the_types_are_those_of_the_code(check, tmp_path):
     if importlib.util.find_spec("mypy") is None:
         pytest.skip("mypy is not installed")
-    command = [sys.executable, "-m", "mypy.stubtest", "sheetlight"]
+    command = [sys.executable, "-m", *check, *(["--cache-dir", str(tmp_path)] if check[0] == "mypy" else [])]
     # Where the package is installed, whatever the folder of this test.
     place = str(Path(sheetlight.__file__).parents[1])
     env = {**os.environ, "MYPYPATH": place, "PYTHONPATH": place}
     done = subprocess.run(command, capture_output=True, text=True, env=env, cwd=place)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_optional_packages_are_extras_and_load_late():
+    """The extras that errors name are there, and an import alone loads none of their packages."""
+    text = (ROOT / "python/pyproject.toml").read_text().partition("[project.optional-dependencies]")[2]
+    extras = set(re.findall(r"^(\w+) = \[", text.partition("\n[")[0], re.M))
+    sources = [file.read_text() for file in (ROOT / "python/sheetlight").rglob("*.py")]
+    named = {extra for source in sources for extra in re.findall(r'needed\([^()]*"(\w+)"\)', source)}
+    assert named == extras == {"files", "convert", "open3d", "rerun"}
+    heavy = ["laspy", "matplotlib", "open3d", "pyarrow", "pye57", "rerun", "tifffile", "trimesh", "xarray"]
+    code = f"import sys, sheetlight; print([p for p in {heavy} if p in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
 def test_the_readmes_lines_work(monkeypatch, capsys):

@@ -3,12 +3,14 @@
 
 mod covariance;
 mod distortion;
+mod flipped;
 mod intrinsics;
 mod parameters;
 mod readout;
 
 pub use covariance::{CameraCovariance, named};
 pub use distortion::{Distortion, TERMS};
+pub use flipped::Flip;
 pub use intrinsics::Intrinsics;
 pub use parameters::{ALWAYS_NAMED, LENS, NAMES, PARAMETERS, ParameterMatrix, Parameters, SKEW, difference_step};
 pub use readout::Readout;

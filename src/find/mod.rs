@@ -10,7 +10,8 @@ pub mod model;
 pub mod scene;
 pub mod search;
 
-pub use insert::locate::{LocateOptions, Report, agree, locate};
+pub use insert::CutOff;
+pub use insert::locate::{LocateOptions, Report, agree, beyond_rim, locate};
 pub use insert::recipe::Recipe;
 pub use insert::{TaskOptions, recipe_of};
 pub use look::{LookPlan, Shown, plan_look};

@@ -23,7 +23,7 @@ pub use frames::FollowedFrames;
 pub use markers::Markers;
 pub use meta::{AmbientRef, Beam, ImageSpec, Meta, Sources};
 pub use motion::{Carries, Motion, MotionKind};
-pub use poses::{PoseFile, load_poses, save_poses};
+pub use poses::{PoseFile, load_poses, looks_like_metres, save_poses};
 pub use raw::raw_name;
 pub use readout::{one_readout, stated_once};
 pub use stand::Stand;

@@ -150,17 +150,21 @@ impl PoseFile {
         PoseFile { written: poses.iter().map(Written::matrix).collect(), poses, warnings: Vec::new() }
     }
 
-    /// What is odd about poses that all lie in the robot's own foot.
     fn metres(&self) -> Option<String> {
-        let reach = self.poses.iter().map(|p| p.translation.norm()).fold(0.0, f64::max);
-        (self.poses.len() > 2 && reach < METRES).then(|| {
-            format!(
-                "all {} poses lie within {reach:.2} mm of the base's origin: they look like metres, and are read as \
-                 millimetres",
-                self.poses.len()
-            )
-        })
+        looks_like_metres(&self.poses)
     }
+}
+
+/// What is odd about poses that all lie in the robot's own foot: a sentence, or `None`.
+pub fn looks_like_metres(poses: &[Rigid<Base, Flange>]) -> Option<String> {
+    let reach = poses.iter().map(|p| p.translation.norm()).fold(0.0, f64::max);
+    (poses.len() > 2 && reach < METRES).then(|| {
+        format!(
+            "all {} poses lie within {reach:.2} mm of the base's origin: they look like metres, and are read as \
+             millimetres",
+            poses.len()
+        )
+    })
 }
 
 fn from_csv(text: &str) -> Result<PoseFile> {

@@ -47,8 +47,10 @@ fn outputs_that_take_nothing() {
 #[test]
 fn names_that_steer_the_terminal() {
     let dir = tempfile::tempdir().unwrap();
-    let meta = r#"{"format": 1, "set": "a", "units": "\u001b]0;gone\u0007\u001b[31m\u009b2J", "image": {"width": 4, "height": 4,
-        "bits": 8, "channels": 1, "response": "linear", "pixel_centre": "integer coordinates"}, "frames": [{"laser": "a.png"}]}"#;
+    let meta = r#"{"format": 1, "set": "a", "units": "\u001b]0;gone\u0007\u001b[31m\u009b2J", 
+        "image": {"width": 4, "height": 4, "bits": 8, "channels": 1, "response": "linear",
+                  "pixel_centre": "integer coordinates"},
+        "frames": [{"laser": "a.png"}]}"#;
     std::fs::write(dir.path().join("meta.json"), meta).unwrap();
     let station = dir.path().join("s");
     for json in ["", "--json"] {

@@ -27,11 +27,11 @@ fn dense(c: &ParameterMatrix) -> DMatrix<f64> {
     DMatrix::from_fn(FIVE, FIVE, |i, j| c[(i, j)])
 }
 
-struct Station {
-    camera: Intrinsics,
-    features: Arc<Vec<Vec3>>,
-    poses: Vec<Rigid<Camera, Board>>,
-    sigma_px: f64,
+pub struct Station {
+    pub camera: Intrinsics,
+    pub features: Arc<Vec<Vec3>>,
+    pub poses: Vec<Rigid<Camera, Board>>,
+    pub sigma_px: f64,
 }
 
 fn random_camera(rng: &mut Pcg64) -> Intrinsics {
@@ -56,7 +56,7 @@ fn random_camera(rng: &mut Pcg64) -> Intrinsics {
     }
 }
 
-fn random_station(seed: u64) -> Station {
+pub fn random_station(seed: u64) -> Station {
     let mut rng = Pcg64::seed_from_u64(seed);
     let camera = random_camera(&mut rng);
     station(camera, [0.01, 0.05, 0.2][seed as usize % 3], rng)
@@ -87,7 +87,7 @@ fn station(camera: Intrinsics, sigma_px: f64, mut rng: Pcg64) -> Station {
     Station { camera, features, poses, sigma_px }
 }
 
-fn seen(s: &Station, seed: u64) -> Vec<Observation> {
+pub fn seen(s: &Station, seed: u64) -> Vec<Observation> {
     let mut rng = Pcg64::seed_from_u64(seed ^ 0x9e37_79b9);
     let noise = Normal::new(0.0, s.sigma_px).unwrap();
     s.poses

@@ -16,6 +16,7 @@ mod hand_eye_judge;
 mod joint;
 mod laser_plane_judge;
 mod legacy_charuco;
+mod mixed_sets;
 mod notations;
 mod photographs;
 mod pointer_judge;

@@ -11,7 +11,7 @@ use sheetlight::calibrate::camera::intrinsics::{Boards, Observation, SolveOption
 use sheetlight::calibrate::camera::lens::Lens;
 use sheetlight::calibrate::camera::procedure::{CameraOptions, calibrate};
 use sheetlight::camera::{Intrinsics, NAMES};
-use sheetlight::geometry::{Board, Camera, Rigid, Vec2};
+use sheetlight::geometry::{Board, Camera, Rigid, Vec2, Vec3};
 use sheetlight::raster::Channel;
 use sheetlight::recording::{BoardSpec, Recording};
 use sheetlight::rig::Verdict;
@@ -204,6 +204,36 @@ fn two_cameras_find_one_shape_of_the_board() {
     let [flat, lifted] = solved[0].0.shape.as_ref().unwrap().departs(&solved[0].1);
     eprintln!("shapes {flat:.4} and {lifted:.4} squares off the drawing, {rms:.4} from each other");
     assert!(rms < 0.3 * flat.hypot(lifted), "{rms} of {flat} {lifted}");
+}
+
+/// Twelve photographs of a circle board that all lean in one direction: a stretch of the print and the two focal
+/// lengths explain the same. The print is believed, and the camera is the photographer's.
+#[test]
+fn a_print_is_not_told_to_be_millimetres_off_by_pictures_from_one_direction() {
+    let Some(reference) = reference() else { return };
+    let text = std::fs::read_to_string(reference.join("camera/real_circle_features/features.csv")).unwrap();
+    let grid = |i: usize| Vec3::new((i % 7) as f64 * 37.5, (i / 7) as f64 * 37.5, 0.0);
+    let features: Arc<Vec<Vec3>> = Arc::new((0..49).map(grid).collect());
+    let mut pictures: Vec<Observation> = (0..12)
+        .map(|i| Observation { name: i.to_string(), features: features.clone(), view: BoardView::default() })
+        .collect();
+    for line in text.lines().skip(1) {
+        let n: Vec<f64> = line.split(',').map(|n| n.parse().unwrap()).collect();
+        let feature_id = n[2] as usize * 7 + n[1] as usize;
+        pictures[n[0] as usize].view.points.push(BoardPoint {
+            feature_id,
+            pixel: Vec2::new(n[3], n[4]),
+            sigma_px: 0.1,
+        });
+    }
+    let options = SolveOptions { lens: Lens::Four, boards: Boards::Shaped, ..SolveOptions::default() };
+    let solved = solve(&pictures, 1920, 1080, &options).unwrap();
+    let (k, off) = (solved.intrinsics, solved.shape.unwrap().departs(&features));
+    println!("{k:?}, {off:?} mm off the drawing");
+    assert!(off[0] < 0.5, "{off:?}");
+    for (ours, theirs) in [(k.fx, 1144.5), (k.fy, 1142.5), (k.cx, 915.9), (k.cy, 521.9)] {
+        assert!((ours - theirs).abs() < 5.0, "{ours} {theirs}");
+    }
 }
 
 /// Halves of each set of pictures, dealt again and again: how far apart their cameras lie over what both state and

@@ -4,7 +4,7 @@
 //! Frame and unit: mm, degrees, s.
 
 use super::speeds::ROOM;
-use super::workplace::{Yes, scene, set};
+use super::workplace::{Yes, scene, set, set_but};
 use sheetlight::cell::Insertion;
 use sheetlight::station::Settings;
 use sheetlight::station::job::{JobReport, JobState, Outcome, Phase};
@@ -55,6 +55,41 @@ fn a_pose_that_is_not_known_well_enough_is_looked_at_again_closer() {
     let first = sigma(who.told.iter().find(|l| l.contains("once more")).expect("a second sweep is told of"));
     let second = sigma(&report.why);
     assert!(second < 0.85 * first, "{first} degrees, then {second}");
+}
+
+/// A part at the rim of what is swept: the sweep is moved there, by a motion that is shown and confirmed like the
+/// first, and the part is inserted.
+#[test]
+fn a_part_at_the_rim_of_the_sweep_is_swept_whole() {
+    let long = std::env::var_os("SHEETLIGHT_LONG").is_some();
+    let ways: &[[f64; 2]] = &[[0.0, 13.0], [0.0, -13.0], [13.0, 0.0], [-13.0, 0.0]];
+    let cases: Vec<(u64, [f64; 2])> = if long {
+        (0..100).map(|k| (1 + k / 4, ways[k as usize % 4])).collect()
+    } else {
+        ways[..2].iter().map(|w| (3, *w)).collect()
+    };
+    let (mut moved, mut inserted) = (0, 0);
+    for (seed, [dx, dy]) in &cases {
+        let lie = |spec: &mut sheetlight::simulate::SceneSpec| {
+            let at = &mut spec.part[0].at_mm;
+            (at[0], at[1]) = (at[0] + dx, at[1] + dy);
+        };
+        let set = set_but(scene("osc", *seed), *seed, 5.0, lie);
+        let mut who = Yes::always();
+        let report = set.run(&set.options("osc.toml", "job", 34.0), &mut who).unwrap();
+        println!("seed {seed}, {dx} {dy} mm aside: {:?} {}\n  {}", report.outcome, report.why, who.told.join("\n  "));
+        let told = who.told.iter().filter(|l| l.contains("the sweep moved by")).count();
+        assert_eq!(who.asked.iter().filter(|s| **s == "scan").count(), 1 + told, "{:?}", who.asked);
+        moved += usize::from(told > 0);
+        let judged = set.served.cell.insertion();
+        let right = judged.as_ref().is_some_and(|j| j.inserted && j.lateral_mm <= 0.15);
+        assert!(right == (report.outcome == Outcome::Inserted), "{judged:?}");
+        inserted += usize::from(right);
+        assert_eq!(set.served.cell.collisions(), 0);
+    }
+    println!("{inserted} of {} inserted, {moved} after the sweep was moved", cases.len());
+    // Along the stripe the part stays in the picture: there nothing is moved.
+    assert!(4 * moved >= cases.len() && 20 * inserted >= 19 * cases.len(), "{moved} moved, {inserted} inserted");
 }
 
 #[test]

@@ -14,5 +14,6 @@ mod pairs;
 mod photos;
 mod plate;
 mod recipes;
+mod rim;
 mod scanned;
 mod sigma;

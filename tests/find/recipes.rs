@@ -16,11 +16,11 @@ use sheetlight::scan::{CloudPoint, Shots};
 use sheetlight::simulate::{Scene, SceneSpec, Station};
 use std::collections::BTreeMap;
 
-const PARTS: [&str; 4] = ["dimm", "led", "osc", "flash"];
+pub const PARTS: [&str; 4] = ["dimm", "led", "osc", "flash"];
 /// What an insertion bears: a pose that passed and is farther off is wrong.
 const WRONG: (f64, f64, f64) = (0.2, 0.1, 0.5);
 
-fn recipe(part: &str) -> Recipe {
+pub fn recipe(part: &str) -> Recipe {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("data/recipes/{part}.toml"));
     Recipe::load(&path).unwrap()
 }
@@ -90,19 +90,19 @@ fn solids(part: &str) -> (&'static str, f64, [f64; 2]) {
     }
 }
 
-struct Scanned {
-    part: &'static str,
-    recipe: Recipe,
-    cloud: Vec<CloudPoint>,
-    shots: Shots,
-    truth: Rigid<Base, Part>,
-    rig: Rig,
-    about: String,
+pub struct Scanned {
+    pub part: &'static str,
+    pub recipe: Recipe,
+    pub cloud: Vec<CloudPoint>,
+    pub shots: Shots,
+    pub truth: Rigid<Base, Part>,
+    pub rig: Rig,
+    pub about: String,
     /// Height of the part over its board, mm.
     height: f64,
 }
 
-fn scan(part: &'static str, seed: u64) -> Scanned {
+pub fn scan(part: &'static str, seed: u64) -> Scanned {
     let mut rng = Pcg64::seed_from_u64(0xF1_0D ^ seed.wrapping_mul(0x9E37_79B9));
     let long = part == "dimm";
     let k = if long || seed.is_multiple_of(3) { 1.0 } else { rng.random_range(0.8..1.2) };

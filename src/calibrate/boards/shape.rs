@@ -35,6 +35,11 @@ impl Basis {
         term >= LINEAR && (term - LINEAR) % 3 == 2
     }
 
+    /// True for the stretch along x against y and the shear.
+    pub fn stretches(term: usize) -> bool {
+        term < LINEAR
+    }
+
     /// Half of the board's longer side, mm: what bending and stretching are small against.
     pub fn size(&self) -> f64 {
         self.half.max()

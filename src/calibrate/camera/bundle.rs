@@ -29,9 +29,14 @@ pub(in crate::calibrate) struct Bent {
     pub usual: [f64; 2],
 }
 
+/// Usual size of a board's stretch and shear over half of its length. The two axes of a printer or plotter agree to a
+/// thousandth (their makers state 0.1 to 0.2 % of length for each), and a camera's focal lengths hide a larger one.
+const STRETCH: f64 = 1e-3;
+
 impl Bent {
     pub fn usual_of(&self, term: usize) -> f64 {
-        self.usual[usize::from(Basis::lifts(term))]
+        let usual = self.usual[usize::from(Basis::lifts(term))];
+        if Basis::stretches(term) { usual.min(STRETCH * self.basis.size()) } else { usual }
     }
 }
 

@@ -3,7 +3,7 @@
 //! Frame and unit: camera_from_board, mm, rad; px (docs/math.md, Camera calibration (7), (9)).
 
 use super::bundle::{Bent, Bundle, Corner, State};
-use super::repeat::{repeat, widened};
+use super::repeat::{Told, each, repeat, widened};
 use crate::calibrate::boards::shape::{Basis, Shape};
 use crate::camera::{Intrinsics, PARAMETERS, ParameterMatrix, Parameters};
 use crate::solve::{LmOptions, Loss, Outcome, Solution, lm};
@@ -42,6 +42,10 @@ impl Fit<'_> {
     pub fn placed(&self, from: State) -> Option<Solution<State>> {
         let all: Vec<usize> = (0..self.bundle(&[]).shared()).collect();
         self.rough(&all, from)
+    }
+    /// What every picture tells of the parameters that are not held.
+    pub fn told(&self, held: &[usize], solution: &Solution<State>) -> Option<Vec<Told>> {
+        each(&self.bundle(held), solution)
     }
     pub fn camera(&self, solution: &Solution<State>) -> Intrinsics {
         self.like.with_parameters(&solution.state.camera)

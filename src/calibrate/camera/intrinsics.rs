@@ -2,7 +2,7 @@
 //! residuals (\[zhang00\] section 3.2 and 3.3; docs/math.md, Camera calibration (7)).
 //! Frame and unit: pixels; board and camera frames in mm.
 
-use super::bundle::{Corner, State};
+use super::bundle::{Bent, Corner, State};
 use super::choice::{by_evidence, by_families, by_shape, resized, shaped};
 use super::fit::Fit;
 use super::lens::Lens;
@@ -101,6 +101,8 @@ pub struct Solved {
     pub iterations: usize,
     /// Whether it is a minimum.
     pub end: End,
+    /// What is believed of the board's shape.
+    bent: Option<Bent>,
 }
 
 impl Solved {
@@ -164,6 +166,25 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
     Ok(finish(&fit, solution, end, held))
 }
 
+/// The same camera from some of its pictures, with what was chosen from all of them.
+pub(super) fn without(
+    solved: &Solved,
+    pictures: &[Observation],
+    out: impl Fn(usize) -> bool,
+    options: &SolveOptions,
+) -> Option<(Intrinsics, Option<Shape>)> {
+    let others: Vec<usize> = (0..pictures.len()).filter(|&i| !out(i)).collect();
+    let corners: Vec<Vec<Corner>> = others.iter().map(|&i| measured(&pictures[i], options.weigh)).collect();
+    let fit = Fit { corners: &corners, like: &solved.intrinsics, loss: options.loss, bent: solved.bent };
+    let start = State {
+        camera: solved.intrinsics.parameters(),
+        shape: solved.shape.as_ref().map_or(Vec::new(), |s| s.coefficients.clone()),
+        poses: others.iter().map(|&i| solved.camera_from_board[i]).collect(),
+    };
+    let found = fit.rough(&solved.held, start)?;
+    Some((fit.camera(&found), fit.shape(&found)))
+}
+
 fn unsolved() -> Fault {
     Fault::refused("the camera could not be solved")
         .cause("the corners contradict each other, or do not determine this number of lens terms")
@@ -174,14 +195,14 @@ fn unsolved() -> Fault {
 }
 
 /// The ways in which the board may differ from its drawing, where all pictures show the same one.
-fn one_board(pictures: &[Observation]) -> Option<Basis> {
+pub(super) fn one_board(pictures: &[Observation]) -> Option<Basis> {
     let first = pictures.first()?;
     pictures.iter().all(|o| o.features == first.features).then(|| Basis::of(&first.features)).flatten()
 }
 
 /// Corners with sigmas for the solver. A floor keeps a few very sharp corners from ruling: printing
 /// and flatness leave about 0.01 px on any real board.
-fn measured(o: &Observation, weigh: bool) -> Vec<Corner> {
+pub(super) fn measured(o: &Observation, weigh: bool) -> Vec<Corner> {
     let sigma = |s: f64| if weigh { s.hypot(0.01) } else { 1.0 };
     o.view.points.iter().map(|p| (o.features[p.feature_id], p.pixel, sigma(p.sigma_px))).collect()
 }
@@ -226,6 +247,7 @@ fn finish(fit: &Fit<'_>, solution: Solution<State>, end: End, held: Vec<usize>) 
         shape,
         camera_from_board: solution.state.poses.clone(),
         covariance: belief.map(|b| b.0),
+        bent: fit.bent,
         repeat: belief.map_or(Parameters::repeat(1.0), |b| b.1),
         held,
         residuals,

@@ -6,6 +6,7 @@ mod choice;
 mod fit;
 pub mod intrinsics;
 pub mod lens;
+pub mod parts;
 mod pictures;
 pub mod procedure;
 pub mod quality;

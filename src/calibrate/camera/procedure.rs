@@ -4,6 +4,7 @@
 
 use super::intrinsics::{Boards, Observation, SolveOptions, Solved, solve};
 use super::lens::{Lens, further_names, held_names};
+use super::parts::apart;
 use super::pictures::{Pictures, one_size, pictures};
 use super::quality;
 use super::ray_error::expected_ray_error;
@@ -107,9 +108,7 @@ pub fn from_observations(
     let agreed = agree(pictures, left_out, [width, height], &options.solve)?;
     let Agreed { pictures, solved, .. } = &agreed;
     let hold_out_px = if pictures.len() > 2 {
-        // Whether the board is as drawn is a matter of the board, not of the picture that is held out.
-        let boards = if solved.shape.is_some() { Boards::Shaped } else { Boards::Drawn };
-        quality::hold_out(pictures, width, height, &SolveOptions { boards, ..options.solve.clone() })
+        quality::hold_out(pictures, solved, &options.solve)
     } else {
         vec![None; pictures.len()]
     };
@@ -120,8 +119,8 @@ pub fn from_observations(
     Ok(CameraResult { calibration, used: pictures, solved, left_out, hold_out_px, worst })
 }
 
-/// Solves, and sets aside what does not fit: one picture at a time, the worst first, because a wrong one bends the
-/// others' residuals too.
+/// Solves, and sets aside what does not fit: a few pictures of another readout, and one picture at a time, the worst
+/// first, because a wrong one bends the others' residuals too.
 fn agree(
     mut pictures: Vec<Observation>,
     mut left_out: Vec<(String, String)>,
@@ -131,6 +130,15 @@ fn agree(
     let mut solved = solve(&pictures, width, height, options)?;
     let most = pictures.len() / 4;
     let (mut outliers, mut contradiction) = (0, false);
+    while let Some(part) = apart(&pictures, &solved, options) {
+        if outliers + part.which.len() > most {
+            return Err(part.fault(&pictures));
+        }
+        outliers += part.which.len();
+        let names = part.which.iter().rev().map(|&i| pictures.remove(i).name);
+        left_out.extend(names.map(|name| (name, part.reason())));
+        solved = solve(&pictures, width, height, options)?;
+    }
     while let Some((i, ratio)) = worst_picture(&pictures, &solved).filter(|w| w.1 > OUTLIER_PICTURE) {
         if outliers == most {
             contradiction = true;

@@ -2,9 +2,10 @@
 //! spread of tilts, coverage, hold-out error, the next best picture.
 //! Frame and unit: pixels, mm, degrees where the name says so.
 
-use super::intrinsics::{Observation, SolveOptions, Solved, solve};
+use super::intrinsics::{Observation, SolveOptions, Solved, without};
 use super::ray_error::expected_ray_error;
 use crate::calibrate::boards::BoardView;
+use crate::calibrate::boards::shape::Shape;
 use crate::calibrate::projection::project;
 use crate::camera::{Intrinsics, PARAMETERS, ParameterMatrix};
 use crate::geometry::{Board, Camera, LeftStep, Rigid, Vec2, Vec3, exp};
@@ -32,21 +33,19 @@ pub fn coverage(pictures: &[Observation], width: u32, height: u32) -> f64 {
     seen.iter().filter(|s| **s).count() as f64 / 48.0
 }
 
-/// Leave-one-out: the camera from all other pictures, the picture left out fitted with its pose alone.
-/// Rms per picture in px; `None` where the others do not give a camera. More than 24 pictures are
-/// left out in 24 groups.
-pub fn hold_out(pictures: &[Observation], width: u32, height: u32, options: &SolveOptions) -> Vec<Option<f64>> {
+/// Leave-one-out: the camera from all other pictures, with the lens's terms and the board's shape that were chosen from
+/// all; the picture left out fitted with its pose alone. Rms per picture in px; `None` where the others do not give a
+/// camera. More than 24 pictures are left out in 24 groups.
+pub fn hold_out(pictures: &[Observation], solved: &Solved, options: &SolveOptions) -> Vec<Option<f64>> {
     use rayon::prelude::*;
     let groups = pictures.len().min(24);
     let each: Vec<Vec<(usize, Option<f64>)>> = (0..groups)
         .into_par_iter()
         .map(|g| {
-            let others: Vec<Observation> =
-                pictures.iter().enumerate().filter(|(i, _)| i % groups != g).map(|(_, o)| o.clone()).collect();
-            let solved = solve(&others, width, height, options).ok();
+            let others = without(solved, pictures, |i| i % groups == g, options);
             (g..pictures.len())
                 .step_by(groups)
-                .map(|i| (i, solved.as_ref().and_then(|s| alone(s, &pictures[i]))))
+                .map(|i| (i, others.as_ref().and_then(|(k, shape)| alone(k, shape.as_ref(), &pictures[i]))))
                 .collect()
         })
         .collect();
@@ -56,8 +55,9 @@ pub fn hold_out(pictures: &[Observation], width: u32, height: u32, options: &Sol
 }
 
 /// sqrt(sum |r|² / n) of one picture with its own pose, px.
-fn alone(others: &Solved, o: &Observation) -> Option<f64> {
-    let pose = crate::calibrate::pose::pose_of_points(&others.intrinsics, &others.places(&o.features), &o.view).ok()?;
+fn alone(camera: &Intrinsics, shape: Option<&Shape>, o: &Observation) -> Option<f64> {
+    let places: Vec<Vec3> = o.features.iter().map(|x| shape.map_or(*x, |s| s.place(x))).collect();
+    let pose = crate::calibrate::pose::pose_of_points(camera, &places, &o.view).ok()?;
     Some(pose.rms_px * std::f64::consts::SQRT_2)
 }
 

@@ -13,7 +13,7 @@ const ALIKE: f64 = 2.0;
 const LEVERAGE: f64 = 0.99;
 
 /// Information on the free parameters from one picture whose pose is unknown, and its pull on them.
-type Told = (DMatrix<f64>, DVector<f64>);
+pub(super) type Told = (DMatrix<f64>, DVector<f64>);
 
 /// Corners of one picture are not independent: blur, light and the board's bending move them together. So pictures
 /// are taken as the things that repeat: each one's pull on the solution, corrected for its own weight in it
@@ -61,7 +61,8 @@ fn pulled((own, pull): &Told, root: &DMatrix<f64>) -> DVector<f64> {
     &share.eigenvectors * free.component_mul(&(share.eigenvectors.transpose() * (root.transpose() * pull)))
 }
 
-fn each(bundle: &Bundle<'_>, solution: &Solution<State>) -> Option<Vec<Told>> {
+/// What every picture tells at a solution.
+pub(super) fn each(bundle: &Bundle<'_>, solution: &Solution<State>) -> Option<Vec<Told>> {
     let State { camera, shape, poses } = &solution.state;
     let camera = bundle.like.with_parameters(camera);
     let mut weights = solution.weights.iter();

@@ -82,7 +82,7 @@ pub(super) fn best_hypothesis(
 
 /// A match in the map as a pose in the base frame: its height is the most frequent one of the points on
 /// the drawing's first face.
-fn lift(pose: &Pose, map: &HeightMap, points: &Ordered, recipe: &Recipe) -> Rigid<Base, Part> {
+pub(super) fn lift(pose: &Pose, map: &HeightMap, points: &Ordered, recipe: &Recipe) -> Rigid<Base, Part> {
     let bin = 0.5 * recipe.measure.height_gate_mm;
     let flat: Rigid<Grid, Part> = Rigid::from_vectors(
         &Vec3::new(0.0, 0.0, pose.angle),

@@ -7,6 +7,7 @@ use super::hypothesis::{Judged, best_hypothesis, lead};
 use super::places::places;
 use super::recipe::{Gates, Recipe};
 pub use super::report::{Poses, Report, RobotPose};
+use super::rim::{CutOff, cut_off};
 use super::verdict::{Agreement, TurnVote, judge, vote};
 use crate::fault::{Fault, Gate, Result};
 use crate::find::look::looks::{self, Agreed, Look, Witness};
@@ -59,7 +60,8 @@ impl LocateOptions {
 }
 
 /// Finds the part of a recipe in a cloud. A part that is not there, or that is seen too badly to be
-/// measured, is a `Fault`; one that was measured but misses a gate is a report without poses.
+/// measured, is a `Fault`; one that was measured but misses a gate is a report without poses. Either says so where
+/// the part goes on beyond the rim of the scan.
 pub fn locate(
     cloud: &[CloudPoint],
     shots: &Shots,
@@ -67,19 +69,73 @@ pub fn locate(
     rig: Option<&Rig>,
     options: &LocateOptions,
 ) -> Result<Report> {
+    let (points, map) = seen(cloud, shots, recipe, options)?;
+    let located = located(&points, &map, recipe, rig, options);
+    if located.as_ref().is_ok_and(|report| report.passed) {
+        return located;
+    }
+    let cut_off = partly(&points, &map, recipe, options)?;
+    match (located, cut_off) {
+        (Err(_), Some(cut)) => Err(cut.fault(&recipe.name)),
+        (located, cut_off) => located.map(|mut report| {
+            report.reasons.splice(..0, cut_off.as_ref().map(CutOff::words));
+            Report { cut_off, ..report }
+        }),
+    }
+}
+
+/// Whether the part goes on beyond the rim of a scan in which it was not found or not measured well enough.
+///
+/// # Errors
+/// As [`locate`], for a cloud or a recipe that cannot be used.
+pub fn beyond_rim(
+    cloud: &[CloudPoint],
+    shots: &Shots,
+    recipe: &Recipe,
+    options: &LocateOptions,
+) -> Result<Option<CutOff>> {
+    let (points, map) = seen(cloud, shots, recipe, options)?;
+    partly(&points, &map, recipe, options)
+}
+
+fn seen(cloud: &[CloudPoint], shots: &Shots, recipe: &Recipe, options: &LocateOptions) -> Result<(Ordered, HeightMap)> {
     recipe.check()?;
     let points = Ordered::new(cloud, shots)?;
     let up = options.up.or_else(|| towards_camera(&points)).unwrap_or_else(Vec3::z);
     let map = grid(cloud, &GridOptions { cell: Some(recipe.cell_mm), up, ..GridOptions::default() })?;
-    let matches = search(&map, recipe, options)?;
-    let all = if options.all { places(&matches, &map) } else { vec![] };
-    let part = examine(&points, &map, recipe, options.expected.as_ref(), &matches)?;
-    let report = conclude(recipe, rig, options, &points, map, part)?;
+    Ok((points, map))
+}
+
+fn located(
+    points: &Ordered,
+    map: &HeightMap,
+    recipe: &Recipe,
+    rig: Option<&Rig>,
+    options: &LocateOptions,
+) -> Result<Report> {
+    let least = recipe.search.min_score.min(recipe.gates.min_score);
+    let matches = search(map, recipe, options, least)?;
+    if matches.is_empty() {
+        return Err(Fault::refused(format!("'{}' was not found: nothing scores {least:.2} or more", recipe.name))
+            .cause("the part is missing, different, hidden, or outside the scan")
+            .next("look at the height map of the scan; scan the part again, or teach it again"));
+    }
+    let all = if options.all { places(&matches, map) } else { vec![] };
+    let part = examine(points, map, recipe, options.expected.as_ref(), &matches)?;
+    let report = conclude(recipe, rig, options, points, map, part)?;
     Ok(Report { all, ..report })
 }
 
-/// Places of a height map that look like the part, best first; there is one at least.
-fn search(map: &HeightMap, recipe: &Recipe, options: &LocateOptions) -> Result<Vec<Match>> {
+/// A part beyond the rim, among the places that score what a part does of which a piece is missing.
+fn partly(points: &Ordered, map: &HeightMap, recipe: &Recipe, options: &LocateOptions) -> Result<Option<CutOff>> {
+    /// Edges beyond the rim are places without a slope, which count half.
+    const OF_A_PIECE: f64 = 0.6;
+    let least = OF_A_PIECE * recipe.search.min_score.min(recipe.gates.min_score);
+    Ok(cut_off(points, map, recipe, &search(map, recipe, options, least)?))
+}
+
+/// Places of a height map that look like the part, best first.
+fn search(map: &HeightMap, recipe: &Recipe, options: &LocateOptions, least: f64) -> Result<Vec<Match>> {
     let scene = scene_of(map, &recipe.layers)?;
     let model = model_of(recipe, &scene)?;
     let mut search = recipe.search;
@@ -88,17 +144,8 @@ fn search(map: &HeightMap, recipe: &Recipe, options: &LocateOptions) -> Result<V
         search.max_matches = SearchOptions::MOST_MATCHES;
         search.candidates = search.candidates.max(2000);
     }
-    search.min_score = search.min_score.min(recipe.gates.min_score);
-    let matches = find_on(&scene, &model, &search, options.accelerator.as_ref())?;
-    if matches.is_empty() {
-        return Err(Fault::refused(format!(
-            "'{}' was not found: nothing scores {:.2} or more",
-            recipe.name, search.min_score
-        ))
-        .cause("the part is missing, different, hidden, or outside the scan")
-        .next("look at the height map of the scan; scan the part again, or teach it again"));
-    }
-    Ok(matches)
+    search.min_score = least;
+    find_on(&scene, &model, &search, options.accelerator.as_ref())
 }
 
 /// The layers of a height map that a recipe wants.
@@ -223,7 +270,7 @@ fn conclude(
     rig: Option<&Rig>,
     options: &LocateOptions,
     points: &Ordered,
-    map: HeightMap,
+    map: &HeightMap,
     part: Examined,
 ) -> Result<Report> {
     let spec = &recipe.insertion;
@@ -232,7 +279,7 @@ fn conclude(
     part.constructions.iter().filter(|b| b.name == spec.construction).for_each(|b| budget.built(b));
     let sizes = size_check(&budget, recipe);
     let disagreement_mm = disagreement(recipe, &part.constructions);
-    let lead = lead(points, &map, recipe, &part.found, &part.measured.base_from_part, &part.agreement);
+    let lead = lead(points, map, recipe, &part.found, &part.measured.base_from_part, &part.agreement);
     let mut gates = gates(&recipe.gates, &part, lead, &budget, disagreement_mm);
     // Where another look says where the part lies, no other place is in question: the looks have to agree.
     gates.retain(|g| options.expected.is_none() || g.name != "margin");
@@ -275,8 +322,9 @@ fn conclude(
         notes,
         sizes,
         looks: None,
+        cut_off: None,
         base_from_constructed,
-        map,
+        map: map.clone(),
     })
 }
 

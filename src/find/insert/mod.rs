@@ -9,7 +9,9 @@ pub mod picture;
 mod places;
 pub mod recipe;
 mod report;
+mod rim;
 pub mod teach;
 pub mod verdict;
 
 pub use from_drawing::{TaskOptions, recipe_of};
+pub use rim::CutOff;

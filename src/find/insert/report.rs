@@ -3,6 +3,7 @@
 
 use super::budget::Budget;
 use super::places::Place;
+use super::rim::CutOff;
 use super::verdict::{Agreement, TurnVote};
 use crate::fault::Gate;
 use crate::find::look::looks::Disagreement;
@@ -97,6 +98,9 @@ pub struct Report {
     /// What further looks at the part said; `None`: one look alone, not cross-checked.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub looks: Option<Disagreement>,
+    /// Where a gate failed because the part goes on beyond the rim of the scan: how far, and past which side.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cut_off: Option<CutOff>,
     /// The part's pose moved by what was constructed: the tool goes by it.
     #[serde(skip)]
     pub base_from_constructed: Rigid<Base, Part>,

@@ -80,6 +80,17 @@ struct Tally {
 
 /// Judges a pose.
 pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, options: &MeasureOptions) -> Agreement {
+    judge_inside(points, drawing, measured, options, &|_, _| true)
+}
+
+/// Judges a pose by the places (x and y of the part) that were scanned; what lies beyond says nothing.
+pub(super) fn judge_inside(
+    points: &Ordered,
+    drawing: &Drawing,
+    measured: &Measured,
+    options: &MeasureOptions,
+    inside: &dyn Fn(f64, f64) -> bool,
+) -> Agreement {
     let drawn = Drawn {
         faces: drawing.faces(),
         edges: EdgeIndex::new(drawing, options.unit()),
@@ -88,12 +99,13 @@ pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, options: 
         options,
     };
     let tally = drawn.count(&localise(points, drawing, &measured.base_from_part, options));
-    let pieces: HashSet<_> = drawn.edges.samples().iter().map(|s| drawn.piece(s.x, s.y, s.shape)).collect();
+    let scanned = drawn.edges.samples().iter().filter(|s| inside(s.x, s.y));
+    let pieces: HashSet<_> = scanned.map(|s| drawn.piece(s.x, s.y, s.shape)).collect();
     let share = |n: usize, of: usize| if of == 0 { 0.0 } else { n as f64 / of as f64 };
     let on_surface = share(tally.on, tally.inside);
     // Without any point beside the part nothing contradicts it there.
     let free = if tally.beside == 0 { 1.0 } else { share(tally.clear, tally.beside) };
-    let (covered, squares) = drawn.covered(&tally.seen);
+    let (covered, squares) = drawn.covered(&tally.seen, inside);
     Agreement {
         on_surface,
         surface_points: tally.inside,
@@ -101,8 +113,8 @@ pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, options: 
         beside_points: tally.beside,
         agreement: on_surface.min(free),
         coverage: share(covered, squares),
-        edges: share(drawn.ended(&measured.observations), pieces.len()),
-        crossed: share(tally.crossed.len(), pieces.len()),
+        edges: share(drawn.ended(&measured.observations).intersection(&pieces).count(), pieces.len()),
+        crossed: share(tally.crossed.intersection(&pieces).count(), pieces.len()),
     }
 }
 
@@ -151,14 +163,14 @@ impl Drawn<'_> {
     }
 
     /// Squares of the drawn surfaces that were seen, and all of them.
-    fn covered(&self, seen: &HashSet<(i32, i32)>) -> (usize, usize) {
+    fn covered(&self, seen: &HashSet<(i32, i32)>, inside: &dyn Fn(f64, f64) -> bool) -> (usize, usize) {
         let (b, square) = (self.bounds, self.lengths.square);
         let ((x0, y0), (x1, y1)) = (self.square(b[0], b[1]), self.square(b[2], b[3]));
         let (mut drawn, mut covered) = (0usize, 0usize);
         for cy in y0..=y1 {
             for cx in x0..=x1 {
                 let (x, y) = ((f64::from(cx) + 0.5) * square, (f64::from(cy) + 0.5) * square);
-                if self.faces.iter().any(|f| f.material(x, y)) {
+                if inside(x, y) && self.faces.iter().any(|f| f.material(x, y)) {
                     drawn += 1;
                     covered += usize::from(seen.contains(&(cx, cy)));
                 }
@@ -168,14 +180,14 @@ impl Drawn<'_> {
     }
 
     /// Pieces of the drawn edges at which a surface was seen to end.
-    fn ended(&self, observations: &[Observation]) -> usize {
+    fn ended(&self, observations: &[Observation]) -> HashSet<(i32, i32, usize)> {
         // By the drawing's own sample: a coordinate of an edge may lie between two pieces, where rounding decides.
         let sample = |o: &Observation| {
             let (x, y) = (o.x - o.residual * o.nx, o.y - o.residual * o.ny);
             self.edges.nearest(x, y, self.lengths.piece, |s| (s.shape, s.element) == (o.shape, o.element))
         };
         let ends = observations.iter().filter(|o| o.weight > 0.0).filter_map(sample);
-        ends.map(|s| self.piece(s.x, s.y, s.shape)).collect::<HashSet<_>>().len()
+        ends.map(|s| self.piece(s.x, s.y, s.shape)).collect()
     }
 }
 

@@ -23,6 +23,8 @@ pub struct Ordered {
     pub row: Vec<u32>,
     /// Pixel along the stripe, counted from the first that any shot reached.
     pub column: Vec<u32>,
+    /// Along which axis of the picture columns are counted.
+    pub along: Along,
     /// Shot number of each row.
     pub shot: Vec<u32>,
     /// Where the camera stood at each row's shot; `None` where nobody knows.
@@ -53,8 +55,8 @@ impl Ordered {
         shot.dedup();
         let from_camera = places(&shot, shots)?;
         let table = Table::of(cloud, &shot, shots.along)?;
-        let mut ordered = Ordered::filled(cloud, table, shot, from_camera);
-        ordered.reach_mm = shots.stripe_px.map_or(0.0, |width| ordered.reach(width, shots.along));
+        let mut ordered = Ordered::filled(cloud, table, shots.along, shot, from_camera);
+        ordered.reach_mm = shots.stripe_px.map_or(0.0, |width| ordered.reach(width));
         Ok(ordered)
     }
 
@@ -62,6 +64,7 @@ impl Ordered {
     fn filled(
         cloud: &[CloudPoint],
         Table { columns, mut index }: Table,
+        along: Along,
         shot: Vec<u32>,
         from_camera: Vec<Option<Rigid<Base, Camera>>>,
     ) -> Ordered {
@@ -71,6 +74,7 @@ impl Ordered {
             sigma: vec![],
             row: vec![],
             column: vec![],
+            along,
             pixel: vec![],
             reach_mm: 0.0,
             shot,
@@ -96,8 +100,8 @@ impl Ordered {
 
     /// Two widths of the stripe, and along a slanted one what profiles along an image axis go farther, in the usual
     /// steps between neighbours along it.
-    fn reach(&self, stripe_px: f32, along: Along) -> f64 {
-        let across = |i: usize| self.pixel[i][usize::from(along == Along::U)];
+    fn reach(&self, stripe_px: f32) -> f64 {
+        let across = |i: usize| self.pixel[i][usize::from(self.along == Along::U)];
         let beside = |i: usize| self.at(i64::from(self.row[i]), i64::from(self.column[i]) + 1);
         let pairs: Vec<(usize, usize)> = (0..self.points.len()).filter_map(|i| Some((i, beside(i)?))).collect();
         let step = median(pairs.iter().map(|&(i, j)| (self.points[j] - self.points[i]).norm()).collect());

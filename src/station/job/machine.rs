@@ -14,7 +14,7 @@ use crate::arm::rules::{Confirmation, Evidence, Guard, Plan, Proposal};
 use crate::arm::{Arm, Motion, Switchboard, Way};
 use crate::fault::{Fault, Gate, Result};
 use crate::find::insert::picture;
-use crate::find::{LocateOptions, Recipe, Report, locate};
+use crate::find::{CutOff, LocateOptions, Recipe, Report, beyond_rim, locate};
 use crate::geometry::{Base, Flange, Rigid, Vec3};
 use crate::recording::Beam;
 use crate::rig::{Rig, hash_file, hash_text};
@@ -69,6 +69,9 @@ const AWAY_MM: f64 = 30.0;
 const LEAST_WAY_MM: f64 = 0.05;
 /// A part whose pose is not known well enough is swept again so often, in steps half as long each time.
 pub(super) const HALVINGS: u32 = 1;
+/// A sweep is moved so often towards a part that goes on beyond its rim: from a piece of a part the way is known
+/// roughly.
+pub(super) const MOVES: usize = 2;
 
 impl<'a> Job<'a> {
     /// Begins the job of a folder, or goes on with the one that stands there.
@@ -268,7 +271,10 @@ impl<'a> Job<'a> {
     fn scan(&mut self) -> Result<Phase> {
         let Some([centre, normal]) = self.state.surface else { return Ok(Phase::Touch) };
         line_is_seen(&mut self.eye, self.guard.link(), &self.rig, &self.settings, &self.options.out.join("lit"))?;
-        let board = Board { start: self.state.start, surface: [centre, normal] };
+        // The camera looks from where the job began, moved along the board.
+        let moved: Vec3 = self.state.moved_mm.iter().sum();
+        let start = Rigid::new(self.state.start.rotation, self.state.start.translation + moved);
+        let board = Board { start, surface: [centre, normal] };
         let planned =
             sweep(&self.settings, &self.rig, &self.recipe, self.options.sweep_mm, self.state.halvings, &board)?;
         let (says, shots, length) = (planned.figures.says(), planned.figures.shots, planned.figures.length_mm);
@@ -299,10 +305,19 @@ impl<'a> Job<'a> {
         let folder = self.options.out.join("scan");
         let (cloud, shots) = (lit_cloud_of(&folder)?, shots_of(&folder)?);
         let options = LocateOptions { up: Some(normal), robot: self.options.robot, ..LocateOptions::default() };
-        let report = locate(&cloud, &shots, &self.recipe, Some(&self.rig), &options)?;
+        let report = match locate(&cloud, &shots, &self.recipe, Some(&self.rig), &options) {
+            Ok(report) => report,
+            Err(fault) => {
+                return match beyond_rim(&cloud, &shots, &self.recipe, &options)? {
+                    Some(cut) => self.sweep_there(&cut, normal).ok_or(fault),
+                    None => Err(fault),
+                };
+            }
+        };
         self.keep(&report)?;
         let tilt = report.base_from_part.direction(&Vec3::z()).dot(&normal).clamp(-1.0, 1.0).acos().to_degrees();
         let (poses, reasons) = (report.poses.clone(), report.reasons.join("; "));
+        let there = report.cut_off.as_ref().and_then(|cut| self.sweep_there(cut, normal));
         // The right part, but not known well enough: more shots are more evidence.
         let closer = report.gates.iter().all(|g| g.passed || g.name.starts_with("sigma"));
         self.operator.tell(&format!(
@@ -311,6 +326,9 @@ impl<'a> Job<'a> {
         ));
         self.found = Some(report);
         let Some(poses) = poses else {
+            if let Some(scan) = there {
+                return Ok(scan);
+            }
             if closer && self.state.halvings < HALVINGS {
                 self.state.halvings += 1;
                 self.operator.tell(&format!("{reasons}: once more, in steps half as long"));
@@ -329,6 +347,18 @@ impl<'a> Job<'a> {
         let tool = self.settings.tool.expect("asked for").flange_from_tool.inverse();
         self.state.poses = Some([&poses.approach, &poses.insertion, &poses.retract].map(|p| p.base_from_tool * tool));
         Ok(Phase::Approach)
+    }
+
+    /// The sweep again, moved along the board towards a part that goes on beyond its rim. The rules of motion judge it
+    /// like any other, and somebody confirms it. `None`: it was moved often enough.
+    fn sweep_there(&mut self, cut: &CutOff, normal: Vec3) -> Option<Phase> {
+        if self.state.moved_mm.len() >= MOVES {
+            return None;
+        }
+        let by = cut.sweep_by_mm - normal * cut.sweep_by_mm.dot(&normal);
+        self.operator.tell(&format!("{}: once more, the sweep moved by {:.0} mm", cut.words(), by.norm()));
+        self.state.moved_mm.push(by);
+        Some(Phase::Scan)
     }
 
     /// What was found, for those who look: the report, its picture, and what the camera sees of the part in the
@@ -363,11 +393,18 @@ impl<'a> Job<'a> {
         })
     }
 
-    fn approach(&mut self) -> Result<Phase> {
-        if self.found.is_none() {
-            // Taken up after a crash: what was found is found again, in the same scan.
-            self.find()?;
+    /// Of a job that is taken up after a crash: what was found is found again, in the same scan.
+    fn found_again(&mut self) -> Result<()> {
+        if self.found.is_some() || self.find()? == Phase::Approach {
+            return Ok(());
         }
+        Err(Fault::refused("the part is not found again in the scan that it was found in")
+            .cause("the scan's folder was changed, or another version of the program scanned")
+            .next("begin a new job in another folder"))
+    }
+
+    fn approach(&mut self) -> Result<Phase> {
+        self.found_again()?;
         let [above, ..] = self.state.poses.expect("found");
         // Sideways at the height where it stands, then down: nothing is crossed that was not seen.
         let at = self.guard.link().pose()?.base_from_flange;
@@ -390,9 +427,7 @@ impl<'a> Job<'a> {
     }
 
     fn insert(&mut self) -> Result<Phase> {
-        if self.found.is_none() {
-            self.find()?;
-        }
+        self.found_again()?;
         let [_, down, _] = self.state.poses.expect("found");
         let says = vec![format!("insertion: {}", written(&self.options.robot.write(&down)))];
         let plan = self.plan("insert", "insert the component".into(), vec![self.leg(down)], self.evidence()?);

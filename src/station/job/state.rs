@@ -67,6 +67,9 @@ pub struct JobState {
     /// So often the step of its sweep was halved, because a pose was not known well enough.
     #[serde(default)]
     pub halvings: u32,
+    /// So far its sweep was moved each time that the part went on beyond the rim of the scan; base frame, mm.
+    #[serde(default)]
+    pub moved_mm: Vec<Vec3>,
     /// When the scan was finished, s since 1970.
     pub scanned_at: Option<f64>,
     /// Flange at approach, insertion and retract.
@@ -106,6 +109,7 @@ impl JobState {
             start,
             surface: None,
             halvings: 0,
+            moved_mm: vec![],
             scanned_at: None,
             poses: None,
             released: false,
@@ -162,7 +166,8 @@ impl JobState {
 
     /// Forgets what was measured.
     pub(super) fn measure_anew(&mut self) {
-        (self.phase, self.surface, self.poses, self.scanned_at, self.halvings) = (Phase::Touch, None, None, None, 0);
+        (self.phase, self.surface, self.poses, self.scanned_at) = (Phase::Touch, None, None, None);
+        (self.halvings, self.moved_mm) = (0, vec![]);
     }
 
     /// Goes on only with the recipe and the calibrations that its poses were made from; back up it may go with any.

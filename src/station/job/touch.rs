@@ -173,6 +173,7 @@ mod tests {
             ("If its stripe covers less than a tenth of the picture", lit::LEAST_SHARE == 0.1),
             ("an eighth of the field's short side at both ends", sweep::ASIDE == 1.0 / 8.0),
             ("the line sweeps once more in steps half as long", machine::HALVINGS == 1),
+            ("the sweep moves there, at most twice", machine::MOVES == 2),
         ] {
             assert!(document.contains(says) && is, "docs/robots.md: {says}");
         }

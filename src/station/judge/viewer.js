@@ -1,13 +1,19 @@
-/* In: points B (three 16-bit numbers each, in steps of STEP mm), heights LOW to HIGH (mm), their colours MAP. Out: a picture of them that
-   turns under the mouse. Nearer points cover those behind. */
+/*
+ * In: points B (three 16-bit numbers each, in steps of STEP mm), heights LOW to HIGH (mm), their
+ * colours MAP. Out: a picture of them that turns under the mouse. Nearer points cover those behind.
+ */
 (() => {
   const bytes = Uint8Array.from(atob(B), (c) => c.charCodeAt(0));
   const points = new Int16Array(bytes.buffer);
   const count = points.length / 3;
   const canvas = document.getElementById("view");
   const context = canvas.getContext("2d");
-  let yaw = -0.35, pitch = 0.85, zoom = 1, reach = 1;
-  for (let i = 0; i < count; i++) reach = Math.max(reach, Math.hypot(points[3 * i], points[3 * i + 1]));
+  let yaw = -0.35,
+    pitch = 0.85,
+    zoom = 1,
+    reach = 1;
+  for (let i = 0; i < count; i++)
+    reach = Math.max(reach, Math.hypot(points[3 * i], points[3 * i + 1]));
 
   const draw = () => {
     const { width, height } = canvas;
@@ -19,8 +25,11 @@
     for (let i = 0; i < width * height; i++) data.set([18, 20, 24, 255], 4 * i);
     const size = scale > 0.08 ? 3 : 2;
     for (let i = 0; i < count; i++) {
-      const x = points[3 * i], y = points[3 * i + 1], z = points[3 * i + 2];
-      const across = cy * x - sy * y, along = sy * x + cy * y;
+      const x = points[3 * i],
+        y = points[3 * i + 1],
+        z = points[3 * i + 2];
+      const across = cy * x - sy * y,
+        along = sy * x + cy * y;
       const u = Math.round(width / 2 + scale * across);
       const v = Math.round(height / 2 - scale * (along * cp + z * sp));
       const near = z * cp - along * sp;
@@ -28,7 +37,8 @@
       const colour = MAP[Math.round(31 * share)];
       for (let a = 0; a < size; a++) {
         for (let b = 0; b < size; b++) {
-          const U = u + a, V = v + b;
+          const U = u + a,
+            V = v + b;
           if (U < 0 || V < 0 || U >= width || V >= height) continue;
           const at = V * width + U;
           if (near <= depth[at]) continue;

@@ -7,9 +7,35 @@ import { store, take, takeRows, tell } from "./store.js";
 import { bar } from "../widgets/bar.js";
 import { fault } from "../widgets/problem.js";
 
-/** Pages in the order of a shift; each module has `show(place, query)`, which returns what ends it. */
-const PAGES = ["station", "picture", "calibrate", "touch", "scan", "surface", "part", "position", "replay", "health", "settings"];
-const NAMES = { station: "Station", picture: "Picture", calibrate: "Calibrate", touch: "Touch", scan: "Scan", surface: "Surface", part: "Part", position: "Position", replay: "Replay", health: "Health", settings: "Settings" };
+/**
+ * Pages in the order of a shift; each module has `show(place, query)`, which returns what ends it.
+ */
+const PAGES = [
+  "station",
+  "picture",
+  "calibrate",
+  "touch",
+  "scan",
+  "surface",
+  "part",
+  "position",
+  "replay",
+  "health",
+  "settings",
+];
+const NAMES = {
+  station: "Station",
+  picture: "Picture",
+  calibrate: "Calibrate",
+  touch: "Touch",
+  scan: "Scan",
+  surface: "Surface",
+  part: "Part",
+  position: "Position",
+  replay: "Replay",
+  health: "Health",
+  settings: "Settings",
+};
 
 let leave = () => {};
 let turn = 0;
@@ -42,11 +68,17 @@ async function page() {
 /** Built once: a link that has the focus keeps it. */
 function nav(current) {
   const place = document.getElementById("nav");
-  if (!place.children.length) fill(place, PAGES.map((p, i) => h("a", { href: `#/${p}`, title: `Alt+${(i + 1) % 10}` })));
+  if (!place.children.length)
+    fill(
+      place,
+      PAGES.map((p, i) => h("a", { href: `#/${p}`, title: `Alt+${(i + 1) % 10}` })),
+    );
   PAGES.forEach((p, i) => {
     const link = place.children[i];
     if (link.textContent !== t(NAMES[p])) link.textContent = t(NAMES[p]);
-    p === current ? link.setAttribute("aria-current", "page") : link.removeAttribute("aria-current");
+    p === current
+      ? link.setAttribute("aria-current", "page")
+      : link.removeAttribute("aria-current");
   });
 }
 
@@ -79,15 +111,33 @@ function door(e) {
       tell("problem", again);
     }
   };
-  fill(document.getElementById("main"), h("form", { class: "panel door stack", onsubmit: knock },
-    h("h1", {}, "Sheetlight"), fault(e),
-    location.protocol === "https:" && [h("label", { for: "password" }, t("Password")), field, h("button", { class: "main" }, t("Open"))]));
+  fill(
+    document.getElementById("main"),
+    h(
+      "form",
+      { class: "panel door stack", onsubmit: knock },
+      h("h1", {}, "Sheetlight"),
+      fault(e),
+      location.protocol === "https:" && [
+        h("label", { for: "password" }, t("Password")),
+        field,
+        h("button", { class: "main" }, t("Open")),
+      ],
+    ),
+  );
 }
 
 function lost(how) {
   store.lost = how;
   tell("lost");
-  if (how === "over") door(new Problem(401, { what: t("The program was started again."), cause: "", next: t("Open the address that it printed.") }));
+  if (how === "over")
+    door(
+      new Problem(401, {
+        what: t("The program was started again."),
+        cause: "",
+        next: t("Open the address that it printed."),
+      }),
+    );
 }
 
 async function start() {
@@ -110,7 +160,8 @@ async function start() {
       post("/lease").catch(() => {});
     }
   };
-  for (const kind of ["pointerdown", "keydown", "wheel"]) addEventListener(kind, touch, { passive: true });
+  for (const kind of ["pointerdown", "keydown", "wheel"])
+    addEventListener(kind, touch, { passive: true });
   addEventListener("language", page);
   await told;
   await page();

@@ -1,10 +1,21 @@
 // In: names, properties, children. Out: elements; text is text, never markup.
 
-/** @param {string} tag @param {Record<string, any>} [props] @param {...any} children */
+/**
+ * @template {keyof HTMLElementTagNameMap} T
+ * @param {T} tag
+ * @param {Record<string, any>} [props]
+ * @param {...any} children
+ * @returns {HTMLElementTagNameMap[T]}
+ */
 export function h(tag, props = {}, ...children) {
   const e = document.createElement(tag);
   set(e, props);
-  e.append(...children.flat(3).filter((c) => c !== null && c !== undefined && c !== false).map(asNode));
+  e.append(
+    ...children
+      .flat(3)
+      .filter((c) => c !== null && c !== undefined && c !== false)
+      .map(asNode),
+  );
   return e;
 }
 
@@ -15,6 +26,9 @@ export function svg(tag, props = {}, ...children) {
   e.append(...children.flat(3).filter(Boolean).map(asNode));
   return e;
 }
+
+/** What a selector finds below an element, as elements of a page. @returns {HTMLElement[]} */
+export const all = (root, selector) => [...root.querySelectorAll(selector)];
 
 const asNode = (c) => (c instanceof Node ? c : document.createTextNode(String(c)));
 
@@ -29,7 +43,12 @@ function set(e, props) {
 
 /** Puts children in the place of what is there. */
 export function fill(e, ...children) {
-  e.replaceChildren(...children.flat(3).filter((c) => c !== null && c !== undefined && c !== false).map(asNode));
+  e.replaceChildren(
+    ...children
+      .flat(3)
+      .filter((c) => c !== null && c !== undefined && c !== false)
+      .map(asNode),
+  );
   return e;
 }
 

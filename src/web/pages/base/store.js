@@ -1,7 +1,8 @@
-// In: events of the server. Out: bar, jobs and growing map as they stand, and word of each change to whoever asked for it.
+// In: events of the server. Out: bar, jobs and growing map as they stand, and word of each change
+// to whoever asked for it.
 
 /** @typedef {import("../../../../docs/messages").Bar} Bar */
-/** @typedef {import("../../../../docs/messages").Job} Job */
+/** @typedef {import("../../../../tools/pages/types").AnyJob} Job */
 
 export const store = {
   /** @type {Bar | null} */ bar: null,
@@ -24,13 +25,21 @@ export function tell(what, value) {
   for (const hear of [...(ears.get(what) ?? [])]) hear(value);
 }
 
-/** Newest first; those that `keep` wants. */
+/** Newest first; those that `keep` wants. @param {(job: Job) => boolean} keep */
 export function jobs(keep = () => true) {
   return [...store.jobs.values()].filter(keep).sort((a, b) => (a.id < b.id ? 1 : -1));
 }
-export const done = (procedure) => jobs((j) => j.order.procedure === procedure && j.state === "done");
+/**
+ * The finished jobs of a procedure, newest first.
+ * @template {import("../../../../docs/messages").Order["procedure"]} P
+ * @param {P} procedure
+ * @returns {import("../../../../tools/pages/types").Done<P>[]}
+ */
+export const done = (procedure) =>
+  /** @type {any} */ (jobs((j) => j.order.procedure === procedure && j.state === "done"));
 /** Finished scans, filtered ones too. */
-export const scans = () => jobs((j) => ["scan", "filter"].includes(j.order.procedure) && j.state === "done");
+export const scans = () =>
+  jobs((j) => ["scan", "filter"].includes(j.order.procedure) && j.state === "done");
 export const busy = () => jobs((j) => j.state === "running" || j.state === "queued").length > 0;
 
 export function take(event) {
@@ -67,7 +76,13 @@ export function take(event) {
 export function takeRows(buffer) {
   const [, job, columns, total, from, rows] = new Uint32Array(buffer, 0, 6);
   if (!store.growing || store.growing.job !== job || from === 0) {
-    store.growing = { job, columns, total, done: 0, heights: new Float32Array(columns * total).fill(NaN) };
+    store.growing = {
+      job,
+      columns,
+      total,
+      done: 0,
+      heights: new Float32Array(columns * total).fill(NaN),
+    };
   }
   store.growing.heights.set(new Float32Array(buffer, 24, rows * columns), from * columns);
   store.growing.done = Math.max(store.growing.done, from + rows);

@@ -1,11 +1,18 @@
-// In: an English text. Out: the same in the screen's language, from one table; English where the table has none.
+// In: an English text. Out: the same in the screen's language, from one table; English where the
+// table has none.
 
 import { TABLE } from "./texts.js";
 
 export const LANGUAGES = { en: "English", de: "Deutsch", zh: "中文", ja: "日本語" };
 const COLUMN = { de: 0, zh: 1, ja: 2 };
 
-const stored = (key) => { try { return localStorage.getItem(key); } catch { return null; } };
+const stored = (key) => {
+  try {
+    return localStorage.getItem(key);
+  } catch {
+    return null;
+  }
+};
 
 export function language() {
   const chosen = stored("language") ?? navigator.language.slice(0, 2);
@@ -30,7 +37,9 @@ export function setTheme(name) {
 /** Puts language and colours onto the document. */
 export function apply() {
   document.documentElement.lang = language();
-  const light = theme() === "light" || (theme() === "auto" && matchMedia("(prefers-color-scheme: light)").matches);
+  const light =
+    theme() === "light" ||
+    (theme() === "auto" && matchMedia("(prefers-color-scheme: light)").matches);
   document.documentElement.dataset.theme = light ? "light" : "dark";
 }
 matchMedia("(prefers-color-scheme: light)").addEventListener("change", apply);

@@ -1,12 +1,30 @@
 // The one table of texts: English, then German, Chinese, Japanese.
 
 export const TABLE = {
-  "1280×960 is twice the resolution of 640×480. Other machines as they were recorded with one clean stripe.": ["1280×960 ist die doppelte Auflösung von 640×480. Andere Maschinen, wie sie mit einem sauberen Streifen aufgezeichnet wurden.", "1280×960 是 640×480 的两倍分辨率。其他机器为单条干净激光线下的记录值。", "1280×960 は 640×480 の倍の解像度。他の機械はきれいな一本線での記録値です。"],
+  "1280×960 is twice the resolution of 640×480. Other machines as they were recorded with one clean stripe.":
+    [
+      "1280×960 ist die doppelte Auflösung von 640×480. Andere Maschinen: mit einem sauberen Streifen gemessen.",
+      "1280×960 是 640×480 的两倍分辨率。其他机器为单条干净激光线下的记录值。",
+      "1280×960 は 640×480 の倍の解像度。他の機械はきれいな一本線での記録値です。"
+    ],
   "68 % within": ["68 % innerhalb", "68 % 在此范围内", "68 % がこの範囲内"],
   "A camera of": ["Eine Kamera mit", "相机", "カメラ"],
-  "A station is its folder: settings, calibrations, recipes and jobs. Copy it while the program is ended.": ["Eine Station ist ihr Ordner: Einstellungen, Kalibrierungen, Rezepte und Aufträge. Kopieren Sie ihn bei beendetem Programm.", "工作站就是它的文件夹：设置、标定、配方和任务。请在程序结束后复制。", "ステーションはフォルダーそのものです：設定、校正、レシピ、ジョブ。プログラム終了中にコピーしてください。"],
-  "A sweep needs camera, laser plane and hand-eye, calibrated.": ["Ein Überstrich braucht Kamera, Laserebene und Hand-Auge, kalibriert.", "扫掠需要已标定的相机、激光平面和手眼。", "走査には校正済みのカメラ、レーザー平面、ハンドアイが必要です。"],
-  "A term is not known: the sum is a lower bound.": ["Ein Beitrag ist nicht bekannt: Die Summe ist eine untere Grenze.", "有一项未知：总和为下限。", "不明な項があります：合計は下限です。"],
+  "A station is its folder: settings, calibrations, recipes and jobs. Copy it while the program is ended.":
+    [
+      "Ein Ordner mit Einstellungen, Kalibrierungen, Rezepten, Aufträgen. Vor dem Kopieren das Programm beenden.",
+      "工作站就是它的文件夹：设置、标定、配方和任务。请在程序结束后复制。",
+      "ステーションはフォルダーそのものです：設定、校正、レシピ、ジョブ。プログラム終了中にコピーしてください。"
+    ],
+  "A sweep needs camera, laser plane and hand-eye, calibrated.": [
+    "Ein Überstrich braucht Kamera, Laserebene und Hand-Auge, kalibriert.",
+    "扫掠需要已标定的相机、激光平面和手眼。",
+    "走査には校正済みのカメラ、レーザー平面、ハンドアイが必要です。"
+  ],
+  "A term is not known: the sum is a lower bound.": [
+    "Ein Beitrag ist nicht bekannt: Die Summe ist eine untere Grenze.",
+    "有一项未知：总和为下限。",
+    "不明な項があります：合計は下限です。"
+  ],
   "Above the plane": ["Über der Ebene", "高于平面", "平面からの高さ"],
   "Accept into the station": ["In die Station übernehmen", "接受到工作站", "ステーションに採用"],
   "Across, mm": ["Quer, mm", "横向，mm", "横に, mm"],
@@ -18,10 +36,18 @@ export const TABLE = {
   "Along": ["Entlang", "方向", "方向"],
   "Along the stripe": ["Entlang des Streifens", "沿激光线", "レーザー線に沿って"],
   "Along, mm": ["Entlang, mm", "沿向，mm", "沿って, mm"],
-  "Alt and a digit open a page; Tab, arrows and Enter do the rest.": ["Alt und eine Ziffer öffnen eine Seite; Tab, Pfeile und Eingabe tun den Rest.", "Alt 加数字打开页面；其余用 Tab、方向键和回车。", "Alt と数字でページを開き、Tab・矢印・Enter で操作します。"],
+  "Alt and a digit open a page; Tab, arrows and Enter do the rest.": [
+    "Alt und eine Ziffer öffnen eine Seite; Tab, Pfeile und Eingabe tun den Rest.",
+    "Alt 加数字打开页面；其余用 Tab、方向键和回车。",
+    "Alt と数字でページを開き、Tab・矢印・Enter で操作します。"
+  ],
   "Approach": ["Anfahren", "接近", "アプローチ"],
   "Arm": ["Scharf schalten", "使能", "有効にする"],
-  "Actual spacing at this speed": ["Bei dieser Geschwindigkeit bleiben", "此速度下剩余", "この速度で残るのは"],
+  "Actual spacing at this speed": [
+    "Bei dieser Geschwindigkeit bleiben",
+    "此速度下剩余",
+    "この速度で残るのは"
+  ],
   "Axis": ["Achse", "轴", "軸"],
   "Back out": ["Zurückziehen", "退出", "後退する"],
   "Back up now": ["Jetzt sichern", "立即备份", "今すぐバックアップ"],
@@ -45,36 +71,80 @@ export const TABLE = {
   "Check all": ["Alles prüfen", "全部检查", "すべて点検"],
   "Check and save": ["Prüfen und speichern", "检查并保存", "確認して保存"],
   "Checks": ["Prüfungen", "检查", "点検"],
-  "Choose a recipe and press Find, or teach a new part on the map.": ["Rezept wählen und Suchen drücken, oder auf der Karte ein neues Teil anlernen.", "选择配方并按“查找”，或在图上示教新零件。", "レシピを選んで「検索」を押すか、マップ上で新しい部品を教示します。"],
-  "Choose a tool above the map, then drag or click.": ["Werkzeug über der Karte wählen, dann ziehen oder klicken.", "选择图上方的工具，然后拖动或点击。", "マップ上のツールを選び、ドラッグまたはクリックします。"],
+  "Choose a recipe and press Find, or teach a new part on the map.": [
+    "Rezept wählen und Suchen drücken, oder auf der Karte ein neues Teil anlernen.",
+    "选择配方并按“查找”，或在图上示教新零件。",
+    "レシピを選んで「検索」を押すか、マップ上で新しい部品を教示します。"
+  ],
+  "Choose a tool above the map, then drag or click.": [
+    "Werkzeug über der Karte wählen, dann ziehen oder klicken.",
+    "选择图上方的工具，然后拖动或点击。",
+    "マップ上のツールを選び、ドラッグまたはクリックします。"
+  ],
   "Close the gripper": ["Greifer schließen", "闭合夹爪", "グリッパーを閉じる"],
   "Colours": ["Farben", "颜色", "配色"],
   "Columns": ["Spalten", "列数", "列"],
   "Compare": ["Vergleichen", "比较", "比較"],
-  "Component in the simulated gripper; the arm is jogged over its part": ["Bauteil im simulierten Greifer; der Arm wird über seinen Sockel gefahren", "模拟夹爪中的元件；机械臂移到其零件上方", "模擬グリッパーの部品。アームはその部品の上へ動かされます"],
+  "Component in the simulated gripper; the arm is jogged over its part": [
+    "Bauteil im simulierten Greifer; der Arm wird über seinen Sockel gefahren",
+    "模拟夹爪中的元件；机械臂移到其零件上方",
+    "模擬グリッパーの部品。アームはその部品の上へ動かされます"
+  ],
   "Construct": ["Konstruieren", "构造", "構成する"],
   "Constructed points": ["Konstruierte Punkte", "构造点", "構成点"],
   "Contrast": ["Kontrast", "对比度", "コントラスト"],
-  "Counted here, of a camera of": ["Hier gezählt, von einer Kamera mit", "本机实测，相机为", "ここで数えた値、カメラは"],
+  "Counted here, of a camera of": [
+    "Hier gezählt, von einer Kamera mit",
+    "本机实测，相机为",
+    "ここで数えた値、カメラは"
+  ],
   "Counters": ["Zähler", "计数", "カウンター"],
   "Covered": ["Abgedeckt", "覆盖", "被覆"],
-  "Cut off when the program ended": ["Beim Ende des Programms abgebrochen", "程序结束时中断", "プログラム終了時に中断"],
+  "Cut off when the program ended": [
+    "Beim Ende des Programms abgebrochen",
+    "程序结束时中断",
+    "プログラム終了時に中断"
+  ],
   "Cut out": ["Ausschneiden", "剪除", "切り抜く"],
   "Delay": ["Verzögerung", "延迟", "遅延"],
   "Delete": ["Löschen", "删除", "削除"],
   "Disk": ["Platte", "磁盘", "ディスク"],
   "Distance": ["Abstand", "距离", "距離"],
-  "Distance along the camera's axis, mm": ["Abstand entlang der Kameraachse, mm", "沿相机轴距离，mm", "カメラ軸方向の距離, mm"],
-  "Drag over one or two pieces of the curve: lines are fitted, step and angle measured.": ["Über ein oder zwei Stücke der Kurve ziehen: Geraden werden angepasst, Stufe und Winkel gemessen.", "在曲线的一段或两段上拖动：拟合直线并测量台阶和角度。", "曲線の一、二区間をドラッグすると直線を当てはめ、段差と角度を測ります。"],
+  "Distance along the camera's axis, mm": [
+    "Abstand entlang der Kameraachse, mm",
+    "沿相机轴距离，mm",
+    "カメラ軸方向の距離, mm"
+  ],
+  "Drag over one or two pieces of the curve: lines are fitted, step and angle measured.": [
+    "Über ein oder zwei Stücke der Kurve ziehen: Geraden werden angepasst, Stufe und Winkel gemessen.",
+    "在曲线的一段或两段上拖动：拟合直线并测量台阶和角度。",
+    "曲線の一、二区間をドラッグすると直線を当てはめ、段差と角度を測ります。"
+  ],
   "Draw a box around a window": ["Rahmen um ein Fenster ziehen", "框出窗口", "窓を囲む"],
   "Draw a box around the body": ["Rahmen um den Körper ziehen", "框出零件本体", "本体を囲む"],
-  "Draw a box around what goes": ["Kasten um das ziehen, was wegfällt", "框出要去除的部分", "除く部分を枠で囲む"],
-  "Draw a box around what stays": ["Kasten um das ziehen, was bleibt", "框出要保留的部分", "残す部分を枠で囲む"],
+  "Draw a box around what goes": [
+    "Kasten um das ziehen, was wegfällt",
+    "框出要去除的部分",
+    "除く部分を枠で囲む"
+  ],
+  "Draw a box around what stays": [
+    "Kasten um das ziehen, was bleibt",
+    "框出要保留的部分",
+    "残す部分を枠で囲む"
+  ],
   "Draw a box over the plane": ["Rahmen über die Ebene ziehen", "框出平面", "平面を囲む"],
-  "Each motion is shown here and waits for the held button.": ["Jede Bewegung wird hier gezeigt und wartet auf den gehaltenen Knopf.", "每个动作都在此显示，并等待按住按钮。", "各動作はここに表示され、ボタンの長押しを待ちます。"],
+  "Each motion is shown here and waits for the held button.": [
+    "Jede Bewegung wird hier gezeigt und wartet auf den gehaltenen Knopf.",
+    "每个动作都在此显示，并等待按住按钮。",
+    "各動作はここに表示され、ボタンの長押しを待ちます。"
+  ],
   "Enlarge": ["Vergrößern", "放大", "拡大"],
   "Expected error": ["Erwarteter Fehler", "预期误差", "予想誤差"],
-  "Expected error of a scanned point, stop by stop": ["Erwarteter Fehler eines gescannten Punktes, Halt für Halt", "每个停点后扫描点的预期误差", "停止ごとの走査点の予想誤差"],
+  "Expected error of a scanned point, stop by stop": [
+    "Erwarteter Fehler eines gescannten Punktes, Halt für Halt",
+    "每个停点后扫描点的预期误差",
+    "停止ごとの走査点の予想誤差"
+  ],
   "Expected error, mm": ["Erwarteter Fehler, mm", "预期误差，mm", "予想誤差、mm"],
   "Exposure": ["Belichtung", "曝光", "露光"],
   "Figure": ["Größe", "指标", "項目"],
@@ -82,7 +152,11 @@ export const TABLE = {
   "Filters": ["Filter", "滤除", "フィルター"],
   "Find": ["Suchen", "查找", "検索"],
   "Find a part": ["Teil suchen", "查找零件", "部品を検索"],
-  "Flange at the first and the last shot": ["Flansch beim ersten und beim letzten Bild", "首帧和末帧的法兰位姿", "最初と最後のショットのフランジ"],
+  "Flange at the first and the last shot": [
+    "Flansch beim ersten und beim letzten Bild",
+    "首帧和末帧的法兰位姿",
+    "最初と最後のショットのフランジ"
+  ],
   "Flange goes to": ["Flansch geht nach", "法兰移至", "フランジの行き先"],
   "Folder": ["Ordner", "文件夹", "フォルダー"],
   "Folders": ["Ordner", "文件夹", "フォルダー"],
@@ -91,36 +165,77 @@ export const TABLE = {
   "Frames": ["Bilder", "帧数", "フレーム"],
   "From": ["Aus", "来源", "元"],
   "From a drawing (DXF)": ["Aus einer Zeichnung (DXF)", "从图纸（DXF）", "図面から（DXF）"],
-  "From a hole's middle to its rim": ["Von der Mitte eines Lochs zum Rand", "从孔中心到边缘", "穴の中心から縁まで"],
+  "From a hole's middle to its rim": [
+    "Von der Mitte eines Lochs zum Rand",
+    "从孔中心到边缘",
+    "穴の中心から縁まで"
+  ],
   "From shot to shot": ["Von Bild zu Bild", "帧间距", "ショット間隔"],
-  "From the middle of the first hole of a grid to its rim": ["Von der Mitte des ersten Lochs eines Rasters zu seinem Rand", "从阵列第一个孔的中心到其边缘", "格子の最初の穴の中心から縁まで"],
+  "From the middle of the first hole of a grid to its rim": [
+    "Von der Mitte des ersten Lochs eines Rasters zu seinem Rand",
+    "从阵列第一个孔的中心到其边缘",
+    "格子の最初の穴の中心から縁まで"
+  ],
   "Gain": ["Verstärkung", "增益", "ゲイン"],
   "Gates": ["Bedingungen", "判定条件", "判定"],
   "Give the arm back": ["Arm zurückgeben", "交还机械臂", "アームを返す"],
   "Grid": ["Raster", "网格阵列", "格子"],
-  "Halt when the pose stands still for": ["Anhalten, wenn die Pose stillsteht seit", "位姿静止达此时间则停止", "姿勢が止まったままなら停止するまで"],
+  "Halt when the pose stands still for": [
+    "Anhalten, wenn die Pose stillsteht seit",
+    "位姿静止达此时间则停止",
+    "姿勢が止まったままなら停止するまで"
+  ],
   "Hand-eye": ["Hand-Auge", "手眼", "ハンドアイ"],
   "Health": ["Zustand", "状态", "健全性"],
   "Height": ["Höhe", "高度", "高さ"],
   "Height map": ["Höhenkarte", "高度图", "高さマップ"],
-  "Height map of the running scan": ["Höhenkarte des laufenden Scans", "当前扫描的高度图", "実行中スキャンの高さマップ"],
-  "Height map, line by line": ["Höhenkarte, Zeile für Zeile", "逐行高度图", "高さマップ（一行ずつ）"],
+  "Height map of the running scan": [
+    "Höhenkarte des laufenden Scans",
+    "当前扫描的高度图",
+    "実行中スキャンの高さマップ"
+  ],
+  "Height map, line by line": [
+    "Höhenkarte, Zeile für Zeile",
+    "逐行高度图",
+    "高さマップ（一行ずつ）"
+  ],
   "Heights": ["Höhen", "高度", "高さ"],
   "Histogram": ["Histogramm", "直方图", "ヒストグラム"],
-  "Histogram (logarithmic)": ["Histogramm (logarithmisch)", "直方图（对数）", "ヒストグラム（対数）"],
+  "Histogram (logarithmic)": [
+    "Histogramm (logarithmisch)",
+    "直方图（对数）",
+    "ヒストグラム（対数）"
+  ],
   "Histogram of repeats": ["Histogramm der Wiederholungen", "重复直方图", "繰り返しのヒストグラム"],
-  "Hold the board next": ["Die Tafel als Nächstes halten", "下一次放置标定板", "次にボードを置く位置"],
+  "Hold the board next": [
+    "Die Tafel als Nächstes halten",
+    "下一次放置标定板",
+    "次にボードを置く位置"
+  ],
   "Hold to move": ["Halten zum Bewegen", "按住以移动", "押し続けて動かす"],
   "Hole": ["Loch", "孔", "穴"],
-  "How the boards leaned, 15, 30, 45 degrees": ["Wie die Tafeln geneigt waren, 15, 30, 45 Grad", "标定板倾斜方向，15、30、45 度", "ボードの傾き、15・30・45 度"],
+  "How the boards leaned, 15, 30, 45 degrees": [
+    "Wie die Tafeln geneigt waren, 15, 30, 45 Grad",
+    "标定板倾斜方向，15、30、45 度",
+    "ボードの傾き、15・30・45 度"
+  ],
   "How the stripe is found": ["Wie der Streifen gefunden wird", "条纹提取设置", "ラインの検出設定"],
   "I have looked": ["Ich habe nachgesehen", "我已查看", "確認しました"],
-  "In the scan's frame, against the median; only where the part stood still between the recordings.": ["Im Rahmen des Scans, gegen den Median; nur wo das Teil zwischen den Aufnahmen stillstand.", "在扫描坐标系中，相对中位数；仅适用于录制间零件静止时。", "走査の座標系で中央値に対して。記録の間に部品が動いていない場合のみ。"],
+  "In the scan's frame, against the median; only where the part stood still between the recordings.":
+    [
+      "Im Rahmen des Scans, gegen den Median; nur wo das Teil zwischen den Aufnahmen stillstand.",
+      "在扫描坐标系中，相对中位数；仅适用于录制间零件静止时。",
+      "走査の座標系で中央値に対して。記録の間に部品が動いていない場合のみ。"
+    ],
   "Insert a part": ["Teil einsetzen", "插入零件", "部品を挿入"],
   "Insertion": ["Einsetzen", "插入", "挿入"],
   "Intensity": ["Helligkeit", "强度", "輝度"],
   "Islands": ["Inseln", "孤立块", "孤立片"],
-  "It moves while the button is held, to what is shown, once. Let go to halt.": ["Er bewegt sich, solange der Knopf gehalten wird, zum Gezeigten, einmal. Loslassen hält an.", "按住按钮时移动到所示位置，仅一次。松开即停。", "ボタンを押している間、表示された所へ一度だけ動きます。離すと止まります。"],
+  "It moves while the button is held, to what is shown, once. Let go to halt.": [
+    "Er bewegt sich, solange der Knopf gehalten wird, zum Gezeigten, einmal. Loslassen hält an.",
+    "按住按钮时移动到所示位置，仅一次。松开即停。",
+    "ボタンを押している間、表示された所へ一度だけ動きます。離すと止まります。"
+  ],
   "Job": ["Auftrag", "任务", "ジョブ"],
   "Jobs": ["Aufträge", "任务", "ジョブ"],
   "Jog over the board": ["Über die Tafel fahren", "移到标定板上方", "ボードの上へ動かす"],
@@ -132,7 +247,12 @@ export const TABLE = {
   "Largest turn": ["Größte Drehung", "最大转角", "最大回転"],
   "Laser": ["Laser", "激光", "レーザー"],
   "Laser plane": ["Laserebene", "激光平面", "レーザー平面"],
-  "Lasers and lamp for a second and a half; look away from the lasers. Nothing moves but the gripper.": ["Laser und Lampe für anderthalb Sekunden; nicht in die Laser sehen. Nichts bewegt sich außer dem Greifer.", "激光和灯亮一秒半；请勿直视激光。除夹爪外无任何运动。", "レーザーと照明は 1.5 秒間。レーザーを見ないこと。グリッパー以外は動きません。"],
+  "Lasers and lamp for a second and a half; look away from the lasers. Nothing moves but the gripper.":
+    [
+      "Laser und Lampe für anderthalb Sekunden; nicht in die Laser sehen. Nichts bewegt sich außer dem Greifer.",
+      "激光和灯亮一秒半；请勿直视激光。除夹爪外无任何运动。",
+      "レーザーと照明は 1.5 秒間。レーザーを見ないこと。グリッパー以外は動きません。"
+    ],
   "Lattice": ["Gitter", "点阵", "格子点"],
   "Layer": ["Ebene", "图层", "レイヤー"],
   "Leaned": ["Geneigt", "倾斜", "傾き"],
@@ -144,10 +264,22 @@ export const TABLE = {
   "Line": ["Linie", "直线", "直線"],
   "Line laser": ["Linienlaser", "线激光", "ラインレーザー"],
   "Longest motion": ["Längste Bewegung", "最长运动", "最長動作"],
-  "Look at the robot.": ["Sehen Sie nach dem Roboter.", "请查看机器人。", "ロボットを確認してください。"],
+  "Look at the robot.": [
+    "Sehen Sie nach dem Roboter.",
+    "请查看机器人。",
+    "ロボットを確認してください。"
+  ],
   "Look at the surface": ["Oberfläche ansehen", "查看表面", "表面を見る"],
-  "Look on; operate, one at a time; everybody stops": ["Zusehen; bedienen, immer nur einer; anhalten darf jeder", "观看；操作（一次一人）；任何人都可停止", "閲覧。操作は一人ずつ。停止は誰でも"],
-  "Number of turns that look alike": ["Sieht nach so vielen Drehungen gleich aus", "旋转多少次看起来相同", "この回数の回転で同じに見える"],
+  "Look on; operate, one at a time; everybody stops": [
+    "Zusehen; bedienen, immer nur einer; anhalten darf jeder",
+    "观看；操作（一次一人）；任何人都可停止",
+    "閲覧。操作は一人ずつ。停止は誰でも"
+  ],
+  "Number of turns that look alike": [
+    "Sieht nach so vielen Drehungen gleich aus",
+    "旋转多少次看起来相同",
+    "この回数の回転で同じに見える"
+  ],
   "Make the recipe": ["Rezept erstellen", "生成配方", "レシピを作成"],
   "Map": ["Karte", "地图", "マップ"],
   "May": ["Darf", "可以", "できること"],
@@ -164,44 +296,109 @@ export const TABLE = {
   "Next": ["Nächster Schritt", "下一步", "次の手順"],
   "Next picture": ["Nächstes Bild", "下一张图", "次の画像"],
   "No": ["Nein", "否", "いいえ"],
-  "No limits of motion are set: nothing is moved. They are a table [motion] in station.toml below.": ["Es sind keine Bewegungsgrenzen gesetzt: Nichts wird bewegt. Sie sind eine Tabelle [motion] in station.toml unten.", "未设置运动限值：不会移动。限值是下方 station.toml 中的 [motion] 表。", "動作制限が未設定なので何も動きません。下の station.toml の [motion] 表で設定します。"],
+  "No motion limits are set: nothing moves. Set them in the table [motion] of station.toml below.":
+    [
+      "Ohne Bewegungsgrenzen bewegt sich nichts. Sie stehen in der Tabelle [motion] von station.toml unten.",
+      "未设置运动限值：不会移动。限值是下方 station.toml 中的 [motion] 表。",
+      "動作制限が未設定なので何も動きません。下の station.toml の [motion] 表で設定します。"
+    ],
   "No more than this allows": ["Mehr erlaubt nicht", "受限于", "これ以上を許さないもの"],
-  "No motion waits for a confirmation.": ["Keine Bewegung wartet auf eine Bestätigung.", "没有等待确认的动作。", "確認待ちの動作はありません。"],
-  "No part was looked for yet.": ["Noch wurde kein Teil gesucht.", "尚未查找零件。", "まだ部品を検索していません。"],
-  "No pose: a gate was missed.": ["Keine Pose: Eine Bedingung ist verfehlt.", "无位姿：有判定未通过。", "姿勢なし：判定を満たしていません。"],
-  "No robot was named when the program was started.": ["Beim Start wurde kein Roboter genannt.", "启动时未指定机器人。", "起動時にロボットが指定されていません。"],
-  "No stop with board and count yet.": ["Noch kein Halt mit Tafel und Zählerstand.", "尚无带标定板和计数的停点。", "ボードとカウントのある停止点はまだありません。"],
-  "No stripe is seen in this picture.": ["In diesem Bild ist kein Streifen zu sehen.", "此图像中看不到激光线。", "この画像にはレーザー線が見えません。"],
-  "Nobody: started without leave to move": ["Niemand: ohne Erlaubnis zur Bewegung gestartet", "无人：启动时未允许移动", "なし：動作許可なしで起動"],
+  "No motion waits for a confirmation.": [
+    "Keine Bewegung wartet auf eine Bestätigung.",
+    "没有等待确认的动作。",
+    "確認待ちの動作はありません。"
+  ],
+  "No part was looked for yet.": [
+    "Noch wurde kein Teil gesucht.",
+    "尚未查找零件。",
+    "まだ部品を検索していません。"
+  ],
+  "No pose: a gate was missed.": [
+    "Keine Pose: Eine Bedingung ist verfehlt.",
+    "无位姿：有判定未通过。",
+    "姿勢なし：判定を満たしていません。"
+  ],
+  "No robot was named when the program was started.": [
+    "Beim Start wurde kein Roboter genannt.",
+    "启动时未指定机器人。",
+    "起動時にロボットが指定されていません。"
+  ],
+  "No stop with board and count yet.": [
+    "Noch kein Halt mit Tafel und Zählerstand.",
+    "尚无带标定板和计数的停点。",
+    "ボードとカウントのある停止点はまだありません。"
+  ],
+  "No stripe is seen in this picture.": [
+    "In diesem Bild ist kein Streifen zu sehen.",
+    "此图像中看不到激光线。",
+    "この画像にはレーザー線が見えません。"
+  ],
+  "Nobody: started without leave to move": [
+    "Niemand: ohne Erlaubnis zur Bewegung gestartet",
+    "无人：启动时未允许移动",
+    "なし：動作許可なしで起動"
+  ],
   "Not used": ["Nicht benutzt", "未使用", "未使用"],
   "Notation": ["Schreibweise", "表示法", "表記"],
   "Notation and limits": ["Schreibweise und Grenzen", "表示法和限值", "表記と制限"],
   "Notes": ["Hinweise", "说明", "注記"],
-  "Nothing that is known limits it.": ["Nichts Bekanntes begrenzt es.", "没有已知的限制。", "分かる範囲で制限はありません。"],
+  "Nothing that is known limits it.": [
+    "Nichts Bekanntes begrenzt es.",
+    "没有已知的限制。",
+    "分かる範囲で制限はありません。"
+  ],
   "Nothing was checked yet.": ["Noch nichts geprüft.", "尚未检查。", "まだ点検していません。"],
-  "Nothing was measured along this line.": ["Entlang dieser Linie wurde nichts gemessen.", "此线上没有测量值。", "この線上に測定値がありません。"],
+  "Nothing was measured along this line.": [
+    "Entlang dieser Linie wurde nichts gemessen.",
+    "此线上没有测量值。",
+    "この線上に測定値がありません。"
+  ],
   "Nothing was scanned yet.": ["Noch nichts gescannt.", "尚未扫描。", "まだスキャンしていません。"],
-  "Nothing: served to this machine alone": ["Nichts: nur für diese Maschine", "无：仅供本机", "なし：この機械のみ"],
+  "Nothing: served to this machine alone": [
+    "Nichts: nur für diese Maschine",
+    "无：仅供本机",
+    "なし：この機械のみ"
+  ],
   "Now the point": ["Nun der Punkt", "现在选点", "次に点を選択"],
   "Of": ["Von", "取自", "元"],
   "Offset": ["Versatz", "偏移", "オフセット"],
   "Old against new": ["Alt gegen neu", "新旧对比", "新旧比較"],
   "On": ["Auf", "运行于", "実行先"],
-  "One pin, then another: the tool goes where their middle says": ["Ein Stift, dann ein anderer: Das Werkzeug fährt dorthin, wo ihre Mitte es sagt", "先点一个针脚，再点另一个：工具按其中点定位", "ピンを 2 本順に指すと、その中点に工具を合わせます"],
+  "One pin, then another: the tool goes where their middle says": [
+    "Ein Stift, dann ein anderer: Das Werkzeug fährt dorthin, wo ihre Mitte es sagt",
+    "先点一个针脚，再点另一个：工具按其中点定位",
+    "ピンを 2 本順に指すと、その中点に工具を合わせます"
+  ],
   "Only watch": ["Nur zusehen", "仅观看", "閲覧のみ"],
   "Open": ["Öffnen", "打开", "開く"],
-  "Open the address that it printed.": ["Öffnen Sie die Adresse, die es ausgegeben hat.", "请打开它显示的地址。", "表示されたアドレスを開いてください。"],
+  "Open the address that it printed.": [
+    "Öffnen Sie die Adresse, die es ausgegeben hat.",
+    "请打开它显示的地址。",
+    "表示されたアドレスを開いてください。"
+  ],
   "Open the gripper": ["Greifer öffnen", "张开夹爪", "グリッパーを開く"],
   "Operate": ["Bedienen", "操作", "操作する"],
   "Other machines": ["Andere Maschinen", "其他机器", "他の機械"],
-  "Other settings for the next run": ["Andere Einstellungen für den nächsten Lauf", "下次运行的其他设置", "次回の設定変更"],
+  "Other settings for the next run": [
+    "Andere Einstellungen für den nächsten Lauf",
+    "下次运行的其他设置",
+    "次回の設定変更"
+  ],
   "Outline": ["Umriss", "轮廓", "外形"],
-  "Outlines: where the part was found, as this camera should see it. Beside the part: do not go.": ["Umrisse: wo das Teil gefunden wurde, wie diese Kamera es sehen müsste. Liegen sie daneben: nicht fahren.", "轮廓：找到的零件在此相机中应处的位置。若偏离零件，请勿移动。", "輪郭：見つかった部品がこのカメラで見えるはずの位置。部品からずれていたら動かさないこと。"],
+  "Outlines: where the part was found, as this camera should see it. Beside the part: do not go.": [
+    "Umrisse: wo das Teil gefunden wurde, wie diese Kamera es sehen müsste. Liegen sie daneben: nicht fahren.",
+    "轮廓：找到的零件在此相机中应处的位置。若偏离零件，请勿移动。",
+    "輪郭：見つかった部品がこのカメラで見えるはずの位置。部品からずれていたら動かさないこと。"
+  ],
   "Output of the gripper": ["Ausgang des Greifers", "夹爪输出", "グリッパーの出力"],
   "Output of the lamp": ["Ausgang der Lampe", "灯的输出", "照明の出力"],
   "Output of the line laser": ["Ausgang des Linienlasers", "线激光输出", "ラインレーザーの出力"],
   "Output of the pointer": ["Ausgang des Zeigers", "指针输出", "ポインターの出力"],
-  "Over the board that was touched.": ["Über der Platine, die angetastet wurde.", "在已触测的电路板上方。", "触れた基板の上。"],
+  "Over the board that was touched.": [
+    "Über der Platine, die angetastet wurde.",
+    "在已触测的电路板上方。",
+    "触れた基板の上。"
+  ],
   "Part": ["Teil", "零件", "部品"],
   "Password": ["Passwort", "密码", "パスワード"],
   "Path over the part": ["Weg über das Teil", "零件上的扫描路径", "部品上の経路"],
@@ -209,32 +406,60 @@ export const TABLE = {
   "Picture": ["Bild", "图像", "画像"],
   "Pictures": ["Bilder", "图像", "画像"],
   "Pictures a second": ["Bilder je Sekunde", "每秒图像数", "毎秒の画像数"],
-  "Pictures, with the corners that were found": ["Bilder mit den gefundenen Ecken", "图像及找到的角点", "画像と見つかった角"],
+  "Pictures, with the corners that were found": [
+    "Bilder mit den gefundenen Ecken",
+    "图像及找到的角点",
+    "画像と見つかった角"
+  ],
   "Piece": ["Stück", "区段", "区間"],
   "Pitch across, mm": ["Abstand quer, mm", "行距，mm", "行ピッチ, mm"],
   "Pitch along, mm": ["Abstand entlang, mm", "列距，mm", "列ピッチ, mm"],
-  "Places of the picture that boards covered": ["Stellen des Bilds, die Tafeln abdeckten", "标定板覆盖的图像区域", "ボードが覆った画像の場所"],
+  "Places of the picture that boards covered": [
+    "Stellen des Bilds, die Tafeln abdeckten",
+    "标定板覆盖的图像区域",
+    "ボードが覆った画像の場所"
+  ],
   "Point": ["Punkt", "点", "点"],
   "Point to plane": ["Punkt zu Ebene", "点到平面", "点と平面"],
   "Pointer": ["Zeiger", "激光指针", "ポインター"],
-  "Points in three dimensions; arrows turn, + and − enlarge": ["Punkte im Raum; Pfeile drehen, + und − vergrößern", "三维点云；方向键旋转，+ − 缩放", "三次元点群；矢印で回転、+ − で拡大縮小"],
+  "Points in three dimensions; arrows turn, + and − enlarge": [
+    "Punkte im Raum; Pfeile drehen, + und − vergrößern",
+    "三维点云；方向键旋转，+ − 缩放",
+    "三次元点群；矢印で回転、+ − で拡大縮小"
+  ],
   "Pose": ["Pose", "位姿", "姿勢"],
   "Poses are written as": ["Posen werden geschrieben als", "位姿表示法", "姿勢の表記"],
   "Position": ["Position", "位置", "位置"],
-  "Press a picture to leave it out, then calibrate again.": ["Bild drücken, um es wegzulassen, dann neu kalibrieren.", "点击图像将其排除，然后重新标定。", "画像を押して除外し、再校正します。"],
+  "Press a picture to leave it out, then calibrate again.": [
+    "Bild drücken, um es wegzulassen, dann neu kalibrieren.",
+    "点击图像将其排除，然后重新标定。",
+    "画像を押して除外し、再校正します。"
+  ],
   "Progress": ["Fortschritt", "进度", "進捗"],
   "Propose square pose": ["Senkrechte Lage vorschlagen", "建议垂直位姿", "直角姿勢を提案"],
-  "Put the board's description into the station's folder boards.": ["Legen Sie die Beschreibung der Tafel in den Ordner boards der Station.", "请把标定板的描述放入工作站的 boards 文件夹。", "ボードの記述をステーションの boards フォルダーに置いてください。"],
+  "Put the board's description into the station's folder boards.": [
+    "Legen Sie die Beschreibung der Tafel in den Ordner boards der Station.",
+    "请把标定板的描述放入工作站的 boards 文件夹。",
+    "ボードの記述をステーションの boards フォルダーに置いてください。"
+  ],
   "REPLAY": ["WIEDERGABE", "回放", "再生"],
   "Really replace it?": ["Wirklich ersetzen?", "确定替换？", "本当に置き換えますか？"],
   "Really restore?": ["Wirklich wiederherstellen?", "确定恢复？", "本当に復元しますか？"],
   "Recipe": ["Rezept", "配方", "レシピ"],
   "Recipe as text": ["Rezept als Text", "配方文本", "レシピ本文"],
-  "Estimated from shot time for a camera at": ["Aus der Zeit je Bild berechnet, für eine Kamera mit", "按每帧用时推算，相机为", "1ショットの時間から計算、カメラは"],
+  "Estimated from shot time for a camera at": [
+    "Aus der Zeit je Bild berechnet, für eine Kamera mit",
+    "按每帧用时推算，相机为",
+    "1ショットの時間から計算、カメラは"
+  ],
   "Recording": ["Aufnahme", "录制", "記録"],
   "Recording of the pointer": ["Aufnahme des Zeigers", "指针录制", "ポインターの記録"],
   "Recordings": ["Aufnahmen", "录制", "記録"],
-  "Recordings that are solved together.": ["Aufnahmen, die zusammen gelöst werden.", "一起求解的记录。", "まとめて解く記録。"],
+  "Recordings that are solved together.": [
+    "Aufnahmen, die zusammen gelöst werden.",
+    "一起求解的记录。",
+    "まとめて解く記録。"
+  ],
   "Reduce": ["Verkleinern", "缩小", "縮小"],
   "Region": ["Bereich", "区域", "領域"],
   "Repeat": ["Wiederholen", "重复", "繰り返す"],
@@ -243,14 +468,14 @@ export const TABLE = {
   "Restored; the previous state is a backup too.": [
     "Wiederhergestellt; der vorige Stand ist auch gesichert.",
     "已恢复；之前的状态也已备份。",
-    "復元しました。前の状態もバックアップ済みです。",
+    "復元しました。前の状態もバックアップ済みです。"
   ],
   "Result": ["Ergebnis", "结果", "結果"],
   "Resume": ["Fortsetzen", "继续", "再開"],
   "Resumed before the part it measures anew, at the part it goes back up.": [
     "Fortgesetzt misst er vor dem Teil neu, am Teil fährt er zurück nach oben.",
     "继续后：到达零件之前重新测量，在零件处则退回上方。",
-    "再開すると、部品の手前では測り直し、部品の位置では上へ戻ります。",
+    "再開すると、部品の手前では測り直し、部品の位置では上へ戻ります。"
   ],
   "Resume or take away": ["Fortsetzen oder entfernen", "继续或删除", "再開または削除"],
   "Retract": ["Zurückziehen", "撤回", "退避"],
@@ -264,18 +489,39 @@ export const TABLE = {
   "Saved.": ["Gespeichert.", "已保存。", "保存しました。"],
   "Scan": ["Scan", "扫描", "スキャン"],
   "Scan B again": ["B erneut scannen", "重新扫描 B", "B を再スキャン"],
-  "Scans and poses are in the frame": ["Scans und Lagen im Koordinatensystem", "扫描与位姿所在坐标系", "スキャンと姿勢の座標系"],
+  "Scans and poses are in the frame": [
+    "Scans und Lagen im Koordinatensystem",
+    "扫描与位姿所在坐标系",
+    "スキャンと姿勢の座標系"
+  ],
   "Section": ["Schnitt", "截面", "断面"],
   "Section: from, to": ["Schnitt: von, bis", "截面：起点、终点", "断面：始点、終点"],
   "Set exposure": ["Belichtung einstellen", "设置曝光", "露光を設定"],
   "Setting": ["Einstellung", "设置", "設定"],
   "Settings": ["Einstellungen", "设置", "設定"],
-  "Settings, calibrations, recipes and boards in one file; jobs stay where they are. Each change makes one before it.": ["Einstellungen, Kalibrierungen, Rezepte und Tafeln in einer Datei; Aufträge bleiben, wo sie sind. Vor jeder Änderung entsteht eine.", "设置、标定、配方和标定板存于一个文件；任务保持原处。每次更改前自动备份。", "設定・校正・レシピ・ボードを一つのファイルに。ジョブはそのまま。変更の前に毎回作られます。"],
-  "Shapes need names for this; a lattice needs a grid, an offset a line or lattice.": ["Formen brauchen dazu Namen; ein Gitter braucht ein Raster, ein Versatz eine Linie oder ein Gitter.", "形状需要名称；点阵需要网格，偏移需要直线或点阵。", "形状に名前が必要です。格子点には格子、オフセットには直線か格子点が必要です。"],
-  "Somebody stands at the emergency stop.": ["Jemand steht am Not-Halt.", "有人守在急停旁。", "誰かが非常停止の前にいます。"],
+  "Settings, calibrations, recipes and boards in one file, without jobs. One is made before each change.":
+    [
+      "Einstellungen, Kalibrierungen, Rezepte und Tafeln, ohne Aufträge. Vor jeder Änderung entsteht eine Datei.",
+      "设置、标定、配方和标定板存于一个文件；任务保持原处。每次更改前自动备份。",
+      "設定・校正・レシピ・ボードを一つのファイルに。ジョブはそのまま。変更の前に毎回作られます。"
+    ],
+  "Shapes need names for this; a lattice needs a grid, an offset a line or lattice.": [
+    "Formen brauchen dazu Namen; ein Gitter braucht ein Raster, ein Versatz eine Linie oder ein Gitter.",
+    "形状需要名称；点阵需要网格，偏移需要直线或点阵。",
+    "形状に名前が必要です。格子点には格子、オフセットには直線か格子点が必要です。"
+  ],
+  "Somebody stands at the emergency stop.": [
+    "Jemand steht am Not-Halt.",
+    "有人守在急停旁。",
+    "誰かが非常停止の前にいます。"
+  ],
   "Source": ["Quelle", "来源", "要因"],
   "Speed": ["Geschwindigkeit", "速度", "速度"],
-  "Speed against step, of a scan that does not stop for its pictures": ["Geschwindigkeit gegen Schritt, für einen Scan, der für Bilder nicht hält", "速度与步距（拍摄时不停的扫描）", "速度とステップ（撮影で止まらない走査）"],
+  "Speed against step, of a scan that does not stop for its pictures": [
+    "Geschwindigkeit gegen Schritt, für einen Scan, der für Bilder nicht hält",
+    "速度与步距（拍摄时不停的扫描）",
+    "速度とステップ（撮影で止まらない走査）"
+  ],
   "Speed of motions": ["Tempo der Bewegungen", "运动速度", "動作速度"],
   "Spots": ["Punkte", "光点", "スポット"],
   "Square pose": ["Senkrechte Lage", "垂直位姿", "直角姿勢"],
@@ -289,7 +535,11 @@ export const TABLE = {
   "Stops along the axis": ["Halte entlang der Achse", "沿轴的停点", "軸に沿った停止点"],
   "Stops of the axis": ["Halte der Achse", "轴的停点", "軸の停止点"],
   "Support file": ["Datei für den Support", "支持文件", "サポートファイル"],
-  "Support file (no pictures)": ["Hilfedatei (ohne Bilder)", "支持文件（不含图像）", "サポートファイル（画像なし）"],
+  "Support file (no pictures)": [
+    "Hilfedatei (ohne Bilder)",
+    "支持文件（不含图像）",
+    "サポートファイル（画像なし）"
+  ],
   "Surface": ["Oberfläche", "表面", "表面"],
   "Sweep": ["Überstrich", "扫掠", "走査"],
   "Sweep, mm": ["Strecke, mm", "扫描行程，mm", "走査幅、mm"],
@@ -299,72 +549,201 @@ export const TABLE = {
   "Target": ["Ziel", "对象", "対象"],
   "Teach": ["Anlernen", "示教", "教示"],
   "Test output": ["Ausgang prüfen", "测试输出", "出力テスト"],
-  "The arm moves: the part is drawn where it was a moment ago.": ["Der Arm bewegt sich: Das Teil ist gezeichnet, wo es eben noch war.", "机械臂在移动：零件画在片刻之前的位置。", "アーム動作中：部品は少し前の位置に描かれています。"],
-  "The benchmark measures the whole chain, every pixel looked at, on this machine's processor and on its GPU.": ["Gemessen wird die ganze Kette, jedes Pixel, auf Prozessor und GPU dieser Maschine.", "测试完整处理链（逐像素），在本机处理器和 GPU 上。", "この機械の CPU と GPU で全画素の処理全体を測ります。"],
-  "The board is taken to lie squarely before the camera until it is touched.": ["Bis sie angetastet ist, gilt die Platine als gerade vor der Kamera.", "触测之前，假定电路板正对相机。", "触れるまでは、基板がカメラに正対しているとみなします。"],
-  "The camera's newest picture": ["Das neueste Bild der Kamera", "相机的最新图像", "カメラの最新画像"],
-  "The drawing is larger than 1 MB: use sheetlight model on the command line.": ["Die Zeichnung ist größer als 1 MB: sheetlight model in der Befehlszeile benutzen.", "图纸大于 1 MB：请在命令行使用 sheetlight model。", "図面が 1 MB を超えています：コマンドラインの sheetlight model を使ってください。"],
+  "The arm moves: the part is drawn where it was a moment ago.": [
+    "Der Arm bewegt sich: Das Teil ist gezeichnet, wo es eben noch war.",
+    "机械臂在移动：零件画在片刻之前的位置。",
+    "アーム動作中：部品は少し前の位置に描かれています。"
+  ],
+  "The benchmark measures the whole chain, every pixel, on this machine's processor and its GPU.": [
+    "Gemessen wird die ganze Kette, jedes Pixel, auf Prozessor und GPU dieser Maschine.",
+    "测试完整处理链（逐像素），在本机处理器和 GPU 上。",
+    "この機械の CPU と GPU で全画素の処理全体を測ります。"
+  ],
+  "The board is taken to lie squarely before the camera until it is touched.": [
+    "Bis sie angetastet ist, gilt die Platine als gerade vor der Kamera.",
+    "触测之前，假定电路板正对相机。",
+    "触れるまでは、基板がカメラに正対しているとみなします。"
+  ],
+  "The camera's newest picture": [
+    "Das neueste Bild der Kamera",
+    "相机的最新图像",
+    "カメラの最新画像"
+  ],
+  "The drawing is larger than 1 MB: use sheetlight model on the command line.": [
+    "Die Zeichnung ist größer als 1 MB: sheetlight model in der Befehlszeile benutzen.",
+    "图纸大于 1 MB：请在命令行使用 sheetlight model。",
+    "図面が 1 MB を超えています：コマンドラインの sheetlight model を使ってください。"
+  ],
   "The fastest way:": ["Der schnellste Weg:", "最快方式：", "最速："],
-  "The first small moves tell nothing yet.": ["Die ersten kleinen Bewegungen sagen noch nichts.", "最初的小动作尚无结果。", "最初の小さな動きではまだ分かりません。"],
-  "The job works; no motion waits.": ["Der Auftrag arbeitet; keine Bewegung wartet.", "任务进行中；没有等待的动作。", "ジョブ実行中。待っている動作はありません。"],
+  "The first small moves tell nothing yet.": [
+    "Die ersten kleinen Bewegungen sagen noch nichts.",
+    "最初的小动作尚无结果。",
+    "最初の小さな動きではまだ分かりません。"
+  ],
+  "The job works; no motion waits.": [
+    "Der Auftrag arbeitet; keine Bewegung wartet.",
+    "任务进行中；没有等待的动作。",
+    "ジョブ実行中。待っている動作はありません。"
+  ],
   "The part as it was found": ["Das Teil, wie es gefunden wurde", "找到的零件", "見つかった部品"],
   "The part, enlarged": ["Das Teil, vergrößert", "零件，放大", "部品の拡大"],
-  "The pointer's spot on three or more places gives the plane that the tool is to stand square to.": ["Der Zeigerpunkt an drei oder mehr Stellen gibt die Ebene, zu der das Werkzeug senkrecht stehen soll.", "三处以上的指针光点给出工具应垂直的平面。", "三か所以上のスポットから、工具を直角に向ける平面が求まります。"],
-  "The program does not answer.": ["Das Programm antwortet nicht.", "程序无响应。", "プログラムが応答しません。"],
-  "The program was started again.": ["Das Programm wurde neu gestartet.", "程序已重新启动。", "プログラムが再起動されました。"],
-  "The program was started without leave to move the robot.": ["Das Programm wurde ohne Erlaubnis zur Bewegung gestartet.", "程序启动时未允许移动机器人。", "ロボットを動かす許可なしで起動されました。"],
-  "The same, with the password, over TLS": ["Dasselbe, mit Passwort, über TLS", "同上，需密码并经 TLS", "同じ。パスワードと TLS で"],
-  "The spots make no plane.": ["Die Punkte ergeben keine Ebene.", "光点不构成平面。", "スポットが平面になりません。"],
-  "The station has no [tool]: a tilt against it and a square pose are not known. Add it on the page Settings.": ["Die Station hat kein [tool]: Neigung dagegen und senkrechte Lage sind nicht bekannt. Auf der Seite Einstellungen ergänzen.", "工作站没有 [tool]：无法得知相对倾斜和垂直位姿。请在“设置”页添加。", "ステーションに [tool] がありません：傾きと直角姿勢は不明です。「設定」で追加してください。"],
-  "The tool stands square as far as that is known.": ["Das Werkzeug steht senkrecht, soweit das bekannt ist.", "就已知精度而言，工具是垂直的。", "分かる範囲では、工具は直角です。"],
-  "The tool turns about its own tip by that and no more; nothing moves from here.": ["Das Werkzeug dreht sich darum um seine eigene Spitze und nicht mehr; von hier bewegt sich nichts.", "工具绕自身尖端转动该角度，不多转；此处不会产生运动。", "工具は先端を中心にその角度だけ回ります。ここからは何も動きません。"],
-  "The two scans have no place in common.": ["Die beiden Scans haben keine Stelle gemeinsam.", "两次扫描没有共同区域。", "二つのスキャンに共通部分がありません。"],
+  "The pointer's spot on three or more places gives the plane that the tool is to stand square to.":
+    [
+      "Der Zeigerpunkt an drei oder mehr Stellen gibt die Ebene, zu der das Werkzeug senkrecht stehen soll.",
+      "三处以上的指针光点给出工具应垂直的平面。",
+      "三か所以上のスポットから、工具を直角に向ける平面が求まります。"
+    ],
+  "The program does not answer.": [
+    "Das Programm antwortet nicht.",
+    "程序无响应。",
+    "プログラムが応答しません。"
+  ],
+  "The program was started again.": [
+    "Das Programm wurde neu gestartet.",
+    "程序已重新启动。",
+    "プログラムが再起動されました。"
+  ],
+  "The program was started without leave to move the robot.": [
+    "Das Programm wurde ohne Erlaubnis zur Bewegung gestartet.",
+    "程序启动时未允许移动机器人。",
+    "ロボットを動かす許可なしで起動されました。"
+  ],
+  "The same, with the password, over TLS": [
+    "Dasselbe, mit Passwort, über TLS",
+    "同上，需密码并经 TLS",
+    "同じ。パスワードと TLS で"
+  ],
+  "The spots make no plane.": [
+    "Die Punkte ergeben keine Ebene.",
+    "光点不构成平面。",
+    "スポットが平面になりません。"
+  ],
+  "The station has no [tool]: tilt and square pose are unknown. Add it on the page Settings.": [
+    "Die Station hat kein [tool]: Neigung und senkrechte Lage sind unbekannt. Auf der Seite Einstellungen ergänzen.",
+    "工作站没有 [tool]：无法得知相对倾斜和垂直位姿。请在“设置”页添加。",
+    "ステーションに [tool] がありません：傾きと直角姿勢は不明です。「設定」で追加してください。"
+  ],
+  "The tool stands square as far as that is known.": [
+    "Das Werkzeug steht senkrecht, soweit das bekannt ist.",
+    "就已知精度而言，工具是垂直的。",
+    "分かる範囲では、工具は直角です。"
+  ],
+  "The tool turns about its own tip by that and no more; nothing moves from here.": [
+    "Das Werkzeug dreht sich darum um seine eigene Spitze und nicht mehr; von hier bewegt sich nichts.",
+    "工具绕自身尖端转动该角度，不多转；此处不会产生运动。",
+    "工具は先端を中心にその角度だけ回ります。ここからは何も動きません。"
+  ],
+  "The two scans have no place in common.": [
+    "Die beiden Scans haben keine Stelle gemeinsam.",
+    "两次扫描没有共同区域。",
+    "二つのスキャンに共通部分がありません。"
+  ],
   "The whole report": ["Der ganze Bericht", "完整报告", "全報告"],
   "The work tolerates": ["Die Arbeit verträgt", "工作公差", "作業の許容差"],
-  "There is no recording of a board for this.": ["Dafür gibt es keine Aufnahme einer Tafel.", "没有适用的标定板录制。", "これに使える校正板の記録がありません。"],
-  "There is no recording of the line below the recordings' folder.": ["Unter dem Ordner der Aufnahmen liegt keine der Linie.", "录制文件夹下没有线激光录制。", "記録フォルダーにライン記録がありません。"],
-  "There is no recording of the pointer on a surface.": ["Es gibt keine Aufnahme des Zeigers auf einer Fläche.", "没有指针在表面上的录制。", "面上のポインター記録がありません。"],
+  "There is no recording of a board for this.": [
+    "Dafür gibt es keine Aufnahme einer Tafel.",
+    "没有适用的标定板录制。",
+    "これに使える校正板の記録がありません。"
+  ],
+  "There is no recording of the line below the recordings' folder.": [
+    "Unter dem Ordner der Aufnahmen liegt keine der Linie.",
+    "录制文件夹下没有线激光录制。",
+    "記録フォルダーにライン記録がありません。"
+  ],
+  "There is no recording of the pointer on a surface.": [
+    "Es gibt keine Aufnahme des Zeigers auf einer Fläche.",
+    "没有指针在表面上的录制。",
+    "面上のポインター記録がありません。"
+  ],
   "There is no recording.": ["Es gibt keine Aufnahme.", "没有录制。", "記録がありません。"],
-  "This browser has no WebGL2: the map shows the same points.": ["Dieser Browser hat kein WebGL2: Die Karte zeigt dieselben Punkte.", "此浏览器不支持 WebGL2：地图显示相同的点。", "WebGL2 がありません：マップで同じ点を表示します。"],
-  "This camera has nothing that can be set from here.": ["An dieser Kamera lässt sich von hier nichts einstellen.", "此相机没有可在此设置的项目。", "このカメラにはここから設定できるものがありません。"],
+  "This browser has no WebGL2: the map shows the same points.": [
+    "Dieser Browser hat kein WebGL2: Die Karte zeigt dieselben Punkte.",
+    "此浏览器不支持 WebGL2：地图显示相同的点。",
+    "WebGL2 がありません：マップで同じ点を表示します。"
+  ],
+  "This camera has nothing that can be set from here.": [
+    "An dieser Kamera lässt sich von hier nichts einstellen.",
+    "此相机没有可在此设置的项目。",
+    "このカメラにはここから設定できるものがありません。"
+  ],
   "This machine": ["Diese Maschine", "本机", "この機械"],
-  "This machine, with the address of this start": ["Diese Maschine, mit der Adresse dieses Starts", "本机，使用本次启动的地址", "この機械、今回の起動アドレスで"],
+  "This machine, with the address of this start": [
+    "Diese Maschine, mit der Adresse dieses Starts",
+    "本机，使用本次启动的地址",
+    "この機械、今回の起動アドレスで"
+  ],
   "This screen": ["Dieser Bildschirm", "此屏幕", "この画面"],
-  "This station is not calibrated yet.": ["Diese Station ist noch nicht kalibriert.", "该工作站尚未标定。", "このステーションは未校正です。"],
+  "This station is not calibrated yet.": [
+    "Diese Station ist noch nicht kalibriert.",
+    "该工作站尚未标定。",
+    "このステーションは未校正です。"
+  ],
   "Time of the last scan": ["Zeit des letzten Scans", "上次扫描用时", "前回スキャンの時間"],
   "Tool": ["Werkzeug", "工具", "ツール"],
   "Tool goes to": ["Werkzeug geht nach", "工具移至", "工具の行き先"],
-  "Tool goes to the part's own place": ["Werkzeug geht an den Ort des Teils selbst", "工具移至零件自身位置", "工具は部品自身の位置へ"],
+  "Tool goes to the part's own place": [
+    "Werkzeug geht an den Ort des Teils selbst",
+    "工具移至零件自身位置",
+    "工具は部品自身の位置へ"
+  ],
   "Tool is at": ["Werkzeug ist bei", "工具位于", "工具の位置"],
   "Tools": ["Werkzeuge", "工具", "ツール"],
   "Touch": ["Antasten", "触测", "タッチ"],
   "Turn": ["Drehung", "转角", "回転"],
   "Turning rate at most": ["Drehrate höchstens", "最大转速", "最大回転速度"],
-  "Two or more places of one recipe show how well they repeat.": ["Zwei oder mehr Orte eines Rezepts zeigen, wie gut sie sich wiederholen.", "同一配方的两个以上位置可显示重复性。", "同じレシピの位置が二つ以上で再現性が分かります。"],
+  "Two or more places of one recipe show how well they repeat.": [
+    "Zwei oder mehr Orte eines Rezepts zeigen, wie gut sie sich wiederholen.",
+    "同一配方的两个以上位置可显示重复性。",
+    "同じレシピの位置が二つ以上で再現性が分かります。"
+  ],
   "Two pins": ["Zwei Stifte", "两个针脚", "2 本のピン"],
   "Two points": ["Zwei Punkte", "两点", "二点間"],
   "Uncertain": ["Unsichere", "不确定处", "不確かな箇所"],
   "Undo": ["Rückgängig", "撤销", "元に戻す"],
-  "Unit, where it names none": ["Einheit, wenn sie keine nennt", "单位（图纸未注明时）", "単位（図面にない場合）"],
+  "Unit, where it names none": [
+    "Einheit, wenn sie keine nennt",
+    "单位（图纸未注明时）",
+    "単位（図面にない場合）"
+  ],
   "Value": ["Wert", "值", "値"],
   "Verdict": ["Urteil", "结论", "判定"],
   "What": ["Was", "项目", "対象"],
-  "The part will drop. Open the gripper?": ["Was er hält, fällt: öffnen?", "夹持物会掉落：张开？", "持っている物が落ちます。開きますか？"],
+  "The part will drop. Open the gripper?": [
+    "Was er hält, fällt: öffnen?",
+    "夹持物会掉落：张开？",
+    "持っている物が落ちます。開きますか？"
+  ],
   "What it is": ["Was es ist", "说明", "内容"],
-  "What limits the speed is not known: state the camera's pictures a second, or scan once.": ["Was die Geschwindigkeit begrenzt, ist nicht bekannt: Bilder je Sekunde der Kamera angeben oder einmal scannen.", "速度限制未知：请填写相机帧率，或先扫描一次。", "速度の制限が不明です：カメラの枚/秒を入れるか、一度走査してください。"],
+  "What limits the speed is not known: state the camera's pictures a second, or scan once.": [
+    "Was die Geschwindigkeit begrenzt, ist nicht bekannt: Bilder je Sekunde der Kamera angeben oder einmal scannen.",
+    "速度限制未知：请填写相机帧率，或先扫描一次。",
+    "速度の制限が不明です：カメラの枚/秒を入れるか、一度走査してください。"
+  ],
   "What the boards cover": ["Was die Tafeln abdecken", "标定板覆盖范围", "ボードの覆う範囲"],
   "What was found": ["Was gefunden wurde", "找到的结果", "見つかったもの"],
-  "Where in the picture the stripe is looked for": ["Wo im Bild der Streifen gesucht wird", "在图像的何处寻找激光线", "画像のどこでレーザー線を探すか"],
+  "Where in the picture the stripe is looked for": [
+    "Wo im Bild der Streifen gesucht wird",
+    "在图像的何处寻找激光线",
+    "画像のどこでレーザー線を探すか"
+  ],
   "Where it comes from": ["Woher sie kommt", "来源分解", "内訳"],
   "Who": ["Wer", "谁", "誰"],
-  "Who armed the robot and holds the button": ["Wer den Roboter scharf geschaltet hat und die Taste hält", "使能机器人并按住按钮的人", "ロボットを有効にしボタンを押している人"],
+  "Who armed the robot and holds the button": [
+    "Wer den Roboter scharf geschaltet hat und die Taste hält",
+    "使能机器人并按住按钮的人",
+    "ロボットを有効にしボタンを押している人"
+  ],
   "Who may what": ["Wer was darf", "权限", "権限"],
   "Whole picture": ["Ganzes Bild", "整幅图像", "画像全体"],
   "Width": ["Breite", "宽度", "幅"],
   "Window": ["Fenster", "窗口", "窓"],
   "Working volume from": ["Arbeitsraum von", "工作范围起", "作業範囲の下限"],
   "Working volume to": ["Arbeitsraum bis", "工作范围止", "作業範囲の上限"],
-  "Working volume, camera depth": ["Arbeitsraum, Kameratiefe", "工作范围（相机深度）", "作業範囲（カメラ奥行き）"],
+  "Working volume, camera depth": [
+    "Arbeitsraum, Kameratiefe",
+    "工作范围（相机深度）",
+    "作業範囲（カメラ奥行き）"
+  ],
   "You operate": ["Sie bedienen", "您在操作", "操作中"],
   "a shot": ["je Bild", "每帧", "1ショット"],
   "absent": ["fehlt", "缺失", "なし"],
@@ -386,7 +765,11 @@ export const TABLE = {
   "base": ["Basis", "基座", "ベース"],
   "base camera": ["feststehende Kamera", "固定相机", "固定カメラ"],
   "allows, mm/s": ["erlaubt, mm/s", "可承受，mm/s", "許容 mm/s"],
-  "beside the robot, it stands still": ["neben dem Roboter, sie steht still", "机器人旁，固定不动", "ロボットの横に固定"],
+  "beside the robot, it stands still": [
+    "neben dem Roboter, sie steht still",
+    "机器人旁，固定不动",
+    "ロボットの横に固定"
+  ],
   "bottom": ["unten", "下", "下"],
   "brightest of 255": ["hellster von 255", "最亮（255）", "最大（255中）"],
   "browsers look on": ["Browser sehen zu", "个浏览器在看", "ブラウザー接続"],
@@ -400,12 +783,20 @@ export const TABLE = {
   "columns without light": ["Spalten ohne Licht", "无光列", "光のない列"],
   "contrast": ["Kontrast", "对比度", "コントラスト"],
   "counts": ["Zählschritte", "计数", "カウント"],
-  "cut off when the program ended": ["beim Ende des Programms abgebrochen", "程序结束时中断", "プログラム終了時に中断"],
+  "cut off when the program ended": [
+    "beim Ende des Programms abgebrochen",
+    "程序结束时中断",
+    "プログラム終了時に中断"
+  ],
   "cut_off": ["abgebrochen", "中断", "中断"],
   "dark": ["dunkel", "深色", "暗い"],
   "dark share": ["dunkler Anteil", "暗区占比", "暗い割合"],
   "disk left": ["Platte frei", "剩余磁盘", "ディスク残量"],
-  "does not lie on the plane of the others and was excluded": ["liegt nicht auf der Ebene der anderen und wurde weggelassen", "不在其他点的平面上，已排除", "他の平面上になく除外"],
+  "does not lie on the plane of the others and was excluded": [
+    "liegt nicht auf der Ebene der anderen und wurde weggelassen",
+    "不在其他点的平面上，已排除",
+    "他の平面上になく除外"
+  ],
   "done": ["fertig", "完成", "完了"],
   "dropped": ["verworfen", "丢弃", "破棄"],
   "echo": ["Echo", "回波", "エコー"],
@@ -418,7 +809,11 @@ export const TABLE = {
   "first profile": ["erstes Profil", "首条轮廓", "最初のプロファイル"],
   "fixed to": ["fest an", "固定于", "固定先："],
   "flange": ["Flansch", "法兰", "フランジ"],
-  "flange to the sides of its box": ["Flansch bis zum Rand seines Raums", "法兰到工作空间边界", "フランジから作業空間の壁まで"],
+  "flange to the sides of its box": [
+    "Flansch bis zum Rand seines Raums",
+    "法兰到工作空间边界",
+    "フランジから作業空間の壁まで"
+  ],
   "flange, at the end": ["Flansch, am Ende", "法兰终点", "フランジの終点"],
   "found": ["gefunden", "已找到", "検出"],
   "frames in": ["Bilder herein", "输入帧", "入力フレーム"],
@@ -429,17 +824,33 @@ export const TABLE = {
   "good": ["gut", "良好", "良好"],
   "hand-eye": ["Hand-Auge", "手眼", "ハンドアイ"],
   "height map and pictures": ["Höhenkarte und Bilder", "高度图和图像", "高さマップと画像"],
-  "held button: longest silence, of 1 s": ["gehaltene Taste: längste Stille, von 1 s", "按住按钮：最长无信号，限 1 s", "押下中ボタンの最長無通信（上限 1 s）"],
+  "held button: longest silence, of 1 s": [
+    "gehaltene Taste: längste Stille, von 1 s",
+    "按住按钮：最长无信号，限 1 s",
+    "押下中ボタンの最長無通信（上限 1 s）"
+  ],
   "here": ["hier", "本机", "この機械"],
   "holes": ["Löcher", "个孔", "穴"],
-  "in / measured / dropped": ["herein / gemessen / verworfen", "输入 / 测得 / 丢弃", "入力 / 測定 / 破棄"],
+  "in / measured / dropped": [
+    "herein / gemessen / verworfen",
+    "输入 / 测得 / 丢弃",
+    "入力 / 測定 / 破棄"
+  ],
   "in all": ["insgesamt", "总计", "合計"],
   "in the dashed box": ["in den gestrichelten Kasten", "在虚线框内", "破線の枠内"],
   "insert": ["einsetzen", "插入", "挿入"],
   "insert?": ["Einsetzen?", "插入？", "挿入しますか？"],
   "inserted": ["eingesetzt", "已插入", "挿入済み"],
-  "is the component in? retract?": ["Sitzt das Bauteil? Zurückziehen?", "元件已插好？退回？", "部品は入りましたか？後退しますか？"],
-  "is the part where the picture shows it? go above it?": ["Ist das Teil, wo das Bild es zeigt? Darüber fahren?", "零件在图示位置吗？移到其上方？", "部品は図の位置にありますか？その上へ行きますか？"],
+  "is the component in? retract?": [
+    "Sitzt das Bauteil? Zurückziehen?",
+    "元件已插好？退回？",
+    "部品は入りましたか？後退しますか？"
+  ],
+  "is the part where the picture shows it? go above it?": [
+    "Ist das Teil, wo das Bild es zeigt? Darüber fahren?",
+    "零件在图示位置吗？移到其上方？",
+    "部品は図の位置にありますか？その上へ行きますか？"
+  ],
   "is the path free?": ["Ist die Bahn frei?", "扫描路径是否畅通？", "走査経路は空いていますか？"],
   "is the way free?": ["Ist der Weg frei?", "路径是否畅通？", "経路は空いていますか？"],
   "its front turned down": ["Vorderseite nach unten gedreht", "正面转向下", "表面を下へ"],
@@ -455,17 +866,33 @@ export const TABLE = {
   "light": ["hell", "浅色", "明るい"],
   "linear axis": ["Linearachse", "直线轴", "直動軸"],
   "lost": ["verloren", "丢失", "消失"],
-  "map: arrows move the cross, Enter puts a point": ["Karte: Pfeile bewegen das Kreuz, Eingabe setzt einen Punkt", "地图：方向键移动十字，回车放点", "マップ：矢印で十字を移動、Enter で点を置く"],
-  "mark: a third of the insertion's tolerance": ["Marke: ein Drittel dessen, was das Einsetzen verträgt", "标记：插入公差的三分之一", "印：挿入許容差の三分の一"],
+  "map: arrows move the cross, Enter puts a point": [
+    "Karte: Pfeile bewegen das Kreuz, Eingabe setzt einen Punkt",
+    "地图：方向键移动十字，回车放点",
+    "マップ：矢印で十字を移動、Enter で点を置く"
+  ],
+  "mark: a third of the insertion's tolerance": [
+    "Marke: ein Drittel dessen, was das Einsetzen verträgt",
+    "标记：插入公差的三分之一",
+    "印：挿入許容差の三分の一"
+  ],
   "measured": ["gemessen", "测得", "測定済み"],
   "median": ["Median", "中位数", "中央値"],
-  "memory, now and at most": ["Speicher, jetzt und höchstens", "内存，当前和峰值", "メモリー、現在と最大"],
+  "memory, now and at most": [
+    "Speicher, jetzt und höchstens",
+    "内存，当前和峰值",
+    "メモリー、現在と最大"
+  ],
   "middle of the spots, mm": ["Mitte der Punkte, mm", "光点中心，mm", "スポット中心, mm"],
   "missed": ["verfehlt", "未通过", "不合格"],
   "missing": ["fehlt", "缺失", "なし"],
   "motions": ["Bewegungen", "个动作", "動作"],
   "motions confirmed": ["bestätigte Bewegungen", "已确认的动作", "確認した動作"],
-  "motions confirmed until then": ["bis dahin bestätigte Bewegungen", "此前确认的动作", "それまでに確認した動作"],
+  "motions confirmed until then": [
+    "bis dahin bestätigte Bewegungen",
+    "此前确认的动作",
+    "それまでに確認した動作"
+  ],
   "moves": ["bewegt sich", "移动中", "移動中"],
   "moving": ["bewegt sich", "运动中", "動作中"],
   "ms a shot": ["ms je Bild", "毫秒/帧", "ms/ショット"],
@@ -479,13 +906,25 @@ export const TABLE = {
   "normal, towards the camera": ["Normale, zur Kamera", "法向（朝相机）", "法線（カメラ向き）"],
   "not set": ["nicht gesetzt", "未设置", "未設定"],
   "not stated": ["nicht angegeben", "未说明", "未指定"],
-  "not stated: [tool] in Settings": ["nicht angegeben: [tool] in den Einstellungen", "未指定：设置中的 [tool]", "未指定：設定の [tool]"],
+  "not stated: [tool] in Settings": [
+    "nicht angegeben: [tool] in den Einstellungen",
+    "未指定：设置中的 [tool]",
+    "未指定：設定の [tool]"
+  ],
   "not switched here": ["nicht von hier", "不由此控制", "ここでは切替不可"],
   "nothing dropped": ["nichts verworfen", "无丢弃", "破棄なし"],
   "of": ["von", "/", "/"],
   "of the cells measured": ["der Zellen gemessen", "网格已测", "のセルを測定"],
-  "of the working volume above the board": ["vom Arbeitsraum über der Platine", "电路板上方的工作范围", "基板より上の作業範囲"],
-  "of the working volume below it": ["vom Arbeitsraum darunter", "电路板下方的工作范围", "基板より下の作業範囲"],
+  "of the working volume above the board": [
+    "vom Arbeitsraum über der Platine",
+    "电路板上方的工作范围",
+    "基板より上の作業範囲"
+  ],
+  "of the working volume below it": [
+    "vom Arbeitsraum darunter",
+    "电路板下方的工作范围",
+    "基板より下の作業範囲"
+  ],
   "of them saturated": ["davon gesättigt", "其中饱和", "うち飽和"],
   "off": ["aus", "关", "切"],
   "on": ["an", "开", "入"],
@@ -495,8 +934,16 @@ export const TABLE = {
   "output": ["Ausgang", "输出", "出力"],
   "outside the working volume": ["außerhalb des Arbeitsraums", "超出工作范围", "作業範囲外"],
   "own": ["eigenes", "自有", "独自"],
-  "part may lie aside, along the stripe": ["Teil darf daneben liegen, längs der Linie", "零件允许偏移，沿激光线", "部品のずれ許容、線に沿って"],
-  "part may lie aside, along the sweep": ["Teil darf daneben liegen, längs des Wegs", "零件允许偏移，沿扫掠方向", "部品のずれ許容、走査方向"],
+  "part may lie aside, along the stripe": [
+    "Teil darf daneben liegen, längs der Linie",
+    "零件允许偏移，沿激光线",
+    "部品のずれ許容、線に沿って"
+  ],
+  "part may lie aside, along the sweep": [
+    "Teil darf daneben liegen, längs des Wegs",
+    "零件允许偏移，沿扫掠方向",
+    "部品のずれ許容、走査方向"
+  ],
   "skipped": ["übergangen", "跳过", "飛ばした"],
   "peaks; wanted": ["Spitzen; gewünscht", "峰值；目标", "ピーク；目標"],
   "picture": ["Bild", "图像", "画像"],
@@ -521,7 +968,11 @@ export const TABLE = {
   "saturated": ["gesättigt", "饱和", "飽和"],
   "scatter, 1 σ": ["Streuung, 1 σ", "离散，1 σ", "ばらつき、1 σ"],
   "score": ["Güte", "得分", "スコア"],
-  "section: arrows move the mark, Enter begins and ends a piece": ["Schnitt: Pfeile bewegen die Marke, Eingabe beginnt und beendet ein Stück", "截面：方向键移动标记，回车开始和结束一段", "断面：矢印で印を移動、Enter で区間の開始と終了"],
+  "section: arrows move the mark, Enter begins and ends a piece": [
+    "Schnitt: Pfeile bewegen die Marke, Eingabe beginnt und beendet ein Stück",
+    "截面：方向键移动标记，回车开始和结束一段",
+    "断面：矢印で印を移動、Enter で区間の開始と終了"
+  ],
   "sent": ["gesendet", "已发送", "送信"],
   "shot": ["Bild", "帧", "ショット"],
   "shots": ["Bilder", "帧", "ショット"],
@@ -530,21 +981,37 @@ export const TABLE = {
   "shots without a stripe": ["Bilder ohne Streifen", "无条纹帧", "ラインなしショット"],
   "software": ["Software", "软件", "ソフトウェア"],
   "speed": ["Geschwindigkeit", "速度", "速度"],
-  "spots off the plane, rms": ["Punkte neben der Ebene, rms", "光点偏离平面，rms", "平面からのずれ, rms"],
+  "spots off the plane, rms": [
+    "Punkte neben der Ebene, rms",
+    "光点偏离平面，rms",
+    "平面からのずれ, rms"
+  ],
   "square to the camera": ["gerade zur Kamera", "正对相机", "カメラに正対"],
   "start": ["Anlauf", "启动", "開始"],
   "stated, 1 σ": ["angegeben, 1 σ", "声明，1 σ", "表示値、1 σ"],
   "steep": ["steil", "过陡", "急"],
   "step": ["Stufe", "台阶", "段差"],
   "stopped": ["angehalten", "已停止", "停止"],
-  "stopped; what was done is kept": ["angehalten; das Getane bleibt", "已停止；已完成部分保留", "停止；済んだ分は保存"],
+  "stopped; what was done is kept": [
+    "angehalten; das Getane bleibt",
+    "已停止；已完成部分保留",
+    "停止；済んだ分は保存"
+  ],
   "stops": ["Halte", "个停点", "停止"],
   "stripe width": ["Streifenbreite", "激光线宽度", "線の幅"],
   "the camera": ["die Kamera", "相机", "カメラ"],
-  "the station's limit of speed": ["die Geschwindigkeitsgrenze der Station", "工作站的速度上限", "ステーションの速度上限"],
+  "the station's limit of speed": [
+    "die Geschwindigkeitsgrenze der Station",
+    "工作站的速度上限",
+    "ステーションの速度上限"
+  ],
   "the tool leans": ["Neigung des Werkzeugs", "工具倾斜", "工具の傾き"],
   "tilt": ["Neigung", "倾角", "傾き"],
-  "tilt against the base's z": ["Neigung gegen z der Basis", "相对基座 z 的倾角", "ベース z との傾き"],
+  "tilt against the base's z": [
+    "Neigung gegen z der Basis",
+    "相对基座 z 的倾角",
+    "ベース z との傾き"
+  ],
   "to": ["bis", "至", "上限"],
   "to the confirmed position": ["bis zur bestätigten Position", "至确认位置", "確認した位置まで"],
   "today": ["heute", "今天", "本日"],
@@ -560,7 +1027,11 @@ export const TABLE = {
   "waits": ["wartet", "等待", "待機"],
   "was switched": ["wurde geschaltet", "已切换", "を切り替えました"],
   "what is measured here": ["was hier gemessen wird", "本机测量速度", "ここでの測定速度"],
-  "where the boards of the laser plane stood": ["wo die Tafeln der Laserebene standen", "激光平面标定板所在处", "レーザー平面の校正板の位置"],
+  "where the boards of the laser plane stood": [
+    "wo die Tafeln der Laserebene standen",
+    "激光平面标定板所在处",
+    "レーザー平面の校正板の位置"
+  ],
   "wide": ["breit", "过宽", "太い"],
   "widest gap": ["größte Lücke", "最大间隔", "最大の間隔"],
   "windows": ["Fenster", "个窗口", "窓"],
@@ -571,5 +1042,5 @@ export const TABLE = {
   "σ": ["σ", "σ", "σ"],
   "σ in the plane": ["σ in der Ebene", "平面内 σ", "面内 σ"],
   "σ of a point, median": ["σ eines Punkts, Median", "点 σ（中位数）", "点の σ（中央値）"],
-  "σ of the turn": ["σ der Drehung", "转角 σ", "回転 σ"],
+  "σ of the turn": ["σ der Drehung", "转角 σ", "回転 σ"]
 };

@@ -1,5 +1,5 @@
-// Settings: language and colours; notation, limits and outputs of the station; its file as text; folders, who may what; backups and the
-// way back; outputs to try.
+// Settings: language and colours; notation, limits and outputs of the station; its file as text;
+// folders, who may what; backups and the way back; outputs to try.
 
 import { get, post, put, url } from "../base/api.js";
 import { fill, h, num } from "../base/dom.js";
@@ -11,44 +11,138 @@ import { choice, panel, table } from "../widgets/parts.js";
 import { attempt } from "../widgets/problem.js";
 import { settingsForm } from "../widgets/settingsform.js";
 
-const OUTPUTS = { line: "Line laser", pointer: "Pointer", room: "Lamp", open: "Open the gripper", close: "Close the gripper" };
+const OUTPUTS = {
+  line: "Line laser",
+  pointer: "Pointer",
+  room: "Lamp",
+  open: "Open the gripper",
+  close: "Close the gripper",
+};
 
 export async function show(place) {
   let now = await get("/settings");
-  const problem = h("div"), saved = h("p", { class: "good-ink", role: "status" }), form = h("div", { class: "stack" }), text = h("div", { class: "stack" }), kept = h("div", { class: "stack" });
+  const problem = h("div"),
+    saved = h("p", { class: "good-ink", role: "status" }),
+    form = h("div", { class: "stack" }),
+    text = h("div", { class: "stack" }),
+    kept = h("div", { class: "stack" });
   /** What changes the station: by who operates, and shown again as it stands then. */
-  const change = (what, said) => attempt(async () => {
-    saved.textContent = "";
-    if (!operating()) await operate(false);
-    now = await what();
-    saved.textContent = said;
-    draw();
-  }, problem);
+  const change = (what, said) =>
+    attempt(async () => {
+      saved.textContent = "";
+      if (!operating()) await operate(false);
+      now = await what();
+      saved.textContent = said;
+      draw();
+    }, problem);
   const draw = () => {
-    settingsForm(form, now, (changes) => change(() => put("/settings", { sha256: now.sha256, changes }), t("Saved.")));
+    settingsForm(form, now, (changes) =>
+      change(() => put("/settings", { sha256: now.sha256, changes }), t("Saved.")),
+    );
     const area = h("textarea", { rows: 16, spellcheck: "false", "aria-label": "station.toml" });
     area.value = now.text;
-    fill(text, area, h("div", { class: "row" }, h("button", { id: "save-text", onclick: () => change(() => put("/settings", { sha256: now.sha256, text: area.value }), t("Saved.")) }, t("Check and save"))));
+    fill(
+      text,
+      area,
+      h(
+        "div",
+        { class: "row" },
+        h(
+          "button",
+          {
+            id: "save-text",
+            onclick: () =>
+              change(() => put("/settings", { sha256: now.sha256, text: area.value }), t("Saved.")),
+          },
+          t("Check and save"),
+        ),
+      ),
+    );
     backups(kept, now, change);
   };
   const outputs = h("div", { class: "stack" });
-  fill(place, h("div", { class: "head" }, h("h1", {}, t("Settings")), saved), problem,
-    h("div", { class: "even" },
-      h("div", { class: "stack" },
+  fill(
+    place,
+    h("div", { class: "head" }, h("h1", {}, t("Settings")), saved),
+    problem,
+    h(
+      "div",
+      { class: "even" },
+      h(
+        "div",
+        { class: "stack" },
         panel(t("Notation and limits"), form),
-        panel(t("Test output"), outputs)),
-      h("div", { class: "stack" },
-        panel(t("This screen"), h("div", { class: "stack" },
-          choice(t("Language"), Object.entries(LANGUAGES), language(), setLanguage),
-          choice(t("Colours"), [["auto", t("as the system")], ["dark", t("dark")], ["light", t("light")]], theme(), setTheme),
-          h("p", { class: "small quiet" }, t("Alt and a digit open a page; Tab, arrows and Enter do the rest.")))),
+        panel(t("Test output"), outputs),
+      ),
+      h(
+        "div",
+        { class: "stack" },
+        panel(
+          t("This screen"),
+          h(
+            "div",
+            { class: "stack" },
+            choice(t("Language"), Object.entries(LANGUAGES), language(), setLanguage),
+            choice(
+              t("Colours"),
+              [
+                ["auto", t("as the system")],
+                ["dark", t("dark")],
+                ["light", t("light")],
+              ],
+              theme(),
+              setTheme,
+            ),
+            h(
+              "p",
+              { class: "small quiet" },
+              t("Alt and a digit open a page; Tab, arrows and Enter do the rest."),
+            ),
+          ),
+        ),
         panel(t("Backup"), kept),
-        panel(t("Folders"), table([t("What"), t("Folder")], [[t("Station"), now.folder], [t("Recordings"), now.recordings]])),
-        panel(t("Who may what"), table([t("Who"), t("May")], [
-          [t("This machine, with the address of this start"), t("Look on; operate, one at a time; everybody stops")],
-          [t("Other machines"), t(now.secured ? "The same, with the password, over TLS" : "Nothing: served to this machine alone")],
-          [t("Motions"), t(store.motion?.may_move ? "Who armed the robot and holds the button" : "Nobody: started without leave to move")]])))),
-    panel("station.toml", text));
+        panel(
+          t("Folders"),
+          table(
+            [t("What"), t("Folder")],
+            [
+              [t("Station"), now.folder],
+              [t("Recordings"), now.recordings],
+            ],
+          ),
+        ),
+        panel(
+          t("Who may what"),
+          table(
+            [t("Who"), t("May")],
+            [
+              [
+                t("This machine, with the address of this start"),
+                t("Look on; operate, one at a time; everybody stops"),
+              ],
+              [
+                t("Other machines"),
+                t(
+                  now.secured
+                    ? "The same, with the password, over TLS"
+                    : "Nothing: served to this machine alone",
+                ),
+              ],
+              [
+                t("Motions"),
+                t(
+                  store.motion?.may_move
+                    ? "Who armed the robot and holds the button"
+                    : "Nobody: started without leave to move",
+                ),
+              ],
+            ],
+          ),
+        ),
+      ),
+    ),
+    panel("station.toml", text),
+  );
   draw();
   return tryOutputs(outputs);
 }
@@ -57,31 +151,138 @@ export async function show(place) {
 function backups(place, now, change) {
   let sure = null;
   const list = h("div");
-  const draw = () => fill(list, now.backups.slice(0, 8).map((b) => h("div", { class: "light" }, h("span", {}, ""),
-    h("span", {}, h("a", { href: url(`/backups/${encodeURIComponent(b.name)}`), download: b.name }, b.name), h("div", { class: "small quiet" }, `${b.files} ${t("files")}, ${num(b.bytes / 1e3, 0, "kB")}`)),
-    h("button", { class: "plain restore", onclick: () => { if (sure === b.name) return change(() => post(`/backups/${encodeURIComponent(b.name)}/restore`), t("Restored; the previous state is a backup too.")); sure = b.name; draw(); } }, t(sure === b.name ? "Really restore?" : "Restore")))));
-  fill(place, h("p", { class: "small quiet" }, t("Settings, calibrations, recipes and boards in one file; jobs stay where they are. Each change makes one before it.")),
-    h("div", { class: "row" }, h("button", { id: "backup", onclick: () => change(() => post("/backups"), t("Backed up.")) }, t("Back up now")), h("a", { href: url("/support"), download: "sheetlight-support.json" }, t("Support file (no pictures)"))), list);
+  const draw = () =>
+    fill(
+      list,
+      now.backups.slice(0, 8).map((b) =>
+        h(
+          "div",
+          { class: "light" },
+          h("span", {}, ""),
+          h(
+            "span",
+            {},
+            h(
+              "a",
+              { href: url(`/backups/${encodeURIComponent(b.name)}`), download: b.name },
+              b.name,
+            ),
+            h(
+              "div",
+              { class: "small quiet" },
+              `${b.files} ${t("files")}, ${num(b.bytes / 1e3, 0, "kB")}`,
+            ),
+          ),
+          h(
+            "button",
+            {
+              class: "plain restore",
+              onclick: () => {
+                if (sure === b.name)
+                  return change(
+                    () => post(`/backups/${encodeURIComponent(b.name)}/restore`),
+                    t("Restored; the previous state is a backup too."),
+                  );
+                sure = b.name;
+                draw();
+              },
+            },
+            t(sure === b.name ? "Really restore?" : "Restore"),
+          ),
+        ),
+      ),
+    );
+  fill(
+    place,
+    h(
+      "p",
+      { class: "small quiet" },
+      t(
+        "Settings, calibrations, recipes and boards in one file, without jobs. One is made before each change.",
+      ),
+    ),
+    h(
+      "div",
+      { class: "row" },
+      h(
+        "button",
+        { id: "backup", onclick: () => change(() => post("/backups"), t("Backed up.")) },
+        t("Back up now"),
+      ),
+      h(
+        "a",
+        { href: url("/support"), download: "sheetlight-support.json" },
+        t("Support file (no pictures)"),
+      ),
+    ),
+    list,
+  );
   draw();
 }
 
-/** Each output of the controller, tried by hand: a laser lights for a moment. The gripper opens at the second press alone. */
+/**
+ * Each output of the controller, tried by hand: a laser lights for a moment. The gripper opens at
+ * the second press alone.
+ */
 function tryOutputs(place) {
-  const armed = h("div", { class: "stack" }), buttons = h("div", { class: "tools" }), said = h("div");
-  const act = (name) => attempt(async () => {
-    if (!operating()) await operate(false);
-    const { number } = await post("/robot/output", { output: name });
-    fill(said, h("p", { class: "small", role: "status" }, `${t(OUTPUTS[name])}: ${t("output")} ${number} ${t("was switched")}`));
-  }, said);
-  let sure = false, before = null;
+  const armed = h("div", { class: "stack" }),
+    buttons = h("div", { class: "tools" }),
+    said = h("div");
+  const act = (name) =>
+    attempt(async () => {
+      if (!operating()) await operate(false);
+      const { number } = await post("/robot/output", { output: name });
+      fill(
+        said,
+        h(
+          "p",
+          { class: "small", role: "status" },
+          `${t(OUTPUTS[name])}: ${t("output")} ${number} ${t("was switched")}`,
+        ),
+      );
+    }, said);
+  let sure = false,
+    before = null;
   const draw = () => {
     const state = JSON.stringify([store.motion?.armed, store.bar?.running, sure]);
     if (state === before) return;
     before = state;
-    fill(buttons, Object.entries(OUTPUTS).map(([name, words]) => h("button", { "data-output": name, disabled: !store.motion?.armed || !!store.bar?.running,
-      onclick: () => { if (name === "open" && !sure) { sure = true; return draw(); } sure = false; draw(); act(name); } }, t(name === "open" && sure ? "The part will drop. Open the gripper?" : words))));
+    fill(
+      buttons,
+      Object.entries(OUTPUTS).map(([name, words]) =>
+        h(
+          "button",
+          {
+            "data-output": name,
+            disabled: !store.motion?.armed || !!store.bar?.running,
+            onclick: () => {
+              if (name === "open" && !sure) {
+                sure = true;
+                return draw();
+              }
+              sure = false;
+              draw();
+              act(name);
+            },
+          },
+          t(name === "open" && sure ? "The part will drop. Open the gripper?" : words),
+        ),
+      ),
+    );
   };
-  fill(place, armed, buttons, h("p", { class: "small quiet" }, t("Lasers and lamp for a second and a half; look away from the lasers. Nothing moves but the gripper.")), said);
+  fill(
+    place,
+    armed,
+    buttons,
+    h(
+      "p",
+      { class: "small quiet" },
+      t(
+        "Lasers and lamp for a second and a half; look away from the lasers. Nothing moves but the gripper.",
+      ),
+    ),
+    said,
+  );
   draw();
   const ends = [arming(armed), on("motion", draw), on("bar", draw)];
   return () => ends.forEach((end) => end());

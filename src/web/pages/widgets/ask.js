@@ -1,5 +1,5 @@
-// In: the motion that a job wants to make. Out: it is shown with its gates and its pose; holding the button confirms it and moves for as
-// long as it is held.
+// In: the motion that a job wants to make. Out: it is shown with its gates and its pose; holding
+// the button confirms it and moves for as long as it is held.
 
 import { post, say, tab } from "../base/api.js";
 import { fill, h, num } from "../base/dom.js";
@@ -17,11 +17,12 @@ const SAY = 150;
 /** Arm, give back, I have looked: what stands before every motion. */
 export function arming(place) {
   const said = h("div");
-  const act = (path, body) => attempt(async () => {
-    if (!operating()) await operate(false);
-    store.motion = await post(path, body);
-    tell("motion");
-  }, said);
+  const act = (path, body) =>
+    attempt(async () => {
+      if (!operating()) await operate(false);
+      store.motion = await post(path, body);
+      tell("motion");
+    }, said);
   let before = null;
   const draw = () => {
     const m = store.motion;
@@ -29,11 +30,53 @@ export function arming(place) {
     if (!m || state === before) return;
     before = state;
     const mine = m.armed === tab.slice(0, 4);
-    if (!m.robot) return void fill(place, h("p", { class: "small quiet" }, t("No robot was named when the program was started.")));
-    if (!m.may_move) return void fill(place, h("p", { class: "small quiet" }, t("The program was started without leave to move the robot.")));
-    fill(place, m.look && h("div", { class: "note" }, h("p", {}, h("b", {}, t("Look at the robot."))), h("p", { class: "small" }, m.look), h("button", { id: "looked", onclick: () => act("/robot/looked") }, t("I have looked"))),
-      h("div", { class: "row" }, h("button", { id: "arm", class: mine ? "" : "main", "aria-pressed": String(mine), onclick: () => act("/robot", { armed: !mine }) }, t(mine ? "Give the arm back" : "Arm")),
-        h("span", { class: "small quiet" }, mine ? t("Each motion is shown here and waits for the held button.") : t("Somebody stands at the emergency stop."))), said);
+    if (!m.robot)
+      return void fill(
+        place,
+        h("p", { class: "small quiet" }, t("No robot was named when the program was started.")),
+      );
+    if (!m.may_move)
+      return void fill(
+        place,
+        h(
+          "p",
+          { class: "small quiet" },
+          t("The program was started without leave to move the robot."),
+        ),
+      );
+    fill(
+      place,
+      m.look &&
+        h(
+          "div",
+          { class: "note" },
+          h("p", {}, h("b", {}, t("Look at the robot."))),
+          h("p", { class: "small" }, m.look),
+          h("button", { id: "looked", onclick: () => act("/robot/looked") }, t("I have looked")),
+        ),
+      h(
+        "div",
+        { class: "row" },
+        h(
+          "button",
+          {
+            id: "arm",
+            class: mine ? "" : "main",
+            "aria-pressed": String(mine),
+            onclick: () => act("/robot", { armed: !mine }),
+          },
+          t(mine ? "Give the arm back" : "Arm"),
+        ),
+        h(
+          "span",
+          { class: "small quiet" },
+          mine
+            ? t("Each motion is shown here and waits for the held button.")
+            : t("Somebody stands at the emergency stop."),
+        ),
+      ),
+      said,
+    );
   };
   draw();
   const offs = [on("motion", draw), on("bar", draw)];
@@ -42,17 +85,34 @@ export function arming(place) {
 
 /** The motion that waits, and the button. */
 export function ask(place) {
-  const shown = h("div", { class: "stack" }), said = h("div", { role: "status" }), lines = h("div", { class: "small said", role: "log" });
+  const shown = h("div", { class: "stack" }),
+    said = h("div", { role: "status" }),
+    lines = h("div", { class: "small said", role: "log" });
   const button = h("button", { class: "main hold", id: "send" }, h("span", {}, t("Hold to move")));
-  const no = h("button", { id: "no", onclick: () => attempt(() => post("/motion/refuse", what()), said) }, t("No"));
+  const no = h(
+    "button",
+    { id: "no", onclick: () => attempt(() => post("/motion/refuse", what()), said) },
+    t("No"),
+  );
   const what = () => ({ job: store.motion.asked.job, hash: store.motion.asked.hash });
-  // The hash that the button was pressed over, or was confirmed; one press goes on to a motion that may follow it.
-  let down = false, over = null, timer = 0, beat = 0, grant = null;
-  const idle = () => { clearTimeout(timer); over = null; button.classList.remove("down"); };
+  // The hash that the button was pressed over, or was confirmed; one press goes on to a motion that
+  // may follow it.
+  let down = false,
+    over = null,
+    timer = 0,
+    beat = 0,
+    grant = null;
+  const idle = () => {
+    clearTimeout(timer);
+    over = null;
+    button.classList.remove("down");
+  };
   const press = async () => {
-    const m = store.motion, a = m?.asked;
+    const m = store.motion,
+      a = m?.asked;
     if (!down || !a || m.moving || over === a.hash) return;
-    const mine = (over = a.hash), body = what();
+    const mine = (over = a.hash),
+      body = what();
     fill(said);
     button.classList.add("down");
     try {
@@ -65,12 +125,23 @@ export function ask(place) {
           grant = given;
           say(`held ${grant}`);
           await post("/motion/go", { grant: given, what: body });
-        } catch (error) { fill(said, fault(error)); up(); }
+        } catch (error) {
+          fill(said, fault(error));
+          up();
+        }
       }, HELD);
-    } catch (error) { fill(said, fault(error)); up(); }
+    } catch (error) {
+      fill(said, fault(error));
+      up();
+    }
   };
   const go = (e) => {
-    if (button.disabled || down || (e.type === "keydown" && (e.repeat || ![" ", "Enter"].includes(e.key)))) return;
+    if (
+      button.disabled ||
+      down ||
+      (e.type === "keydown" && (e.repeat || ![" ", "Enter"].includes(e.key)))
+    )
+      return;
     e.preventDefault();
     if (e.pointerId !== undefined) button.setPointerCapture(e.pointerId);
     down = true;
@@ -87,19 +158,24 @@ export function ask(place) {
   }
   button.addEventListener("pointerdown", go);
   button.addEventListener("keydown", go);
-  for (const kind of ["pointerup", "pointercancel", "keyup", "blur", "contextmenu"]) button.addEventListener(kind, up);
+  for (const kind of ["pointerup", "pointercancel", "keyup", "blur", "contextmenu"])
+    button.addEventListener(kind, up);
   const hidden = () => document.hidden && up();
   document.addEventListener("visibilitychange", hidden);
   addEventListener("blur", up);
   addEventListener("pagehide", up);
   let before = null;
   const draw = () => {
-    const m = store.motion, a = m?.asked;
+    const m = store.motion,
+      a = m?.asked;
     const mine = m?.armed === tab.slice(0, 4);
     const state = JSON.stringify([a?.hash, m?.moving, mine, m?.said.length, m?.job]);
     if (!m || state === before) return;
     before = state;
-    fill(lines, m.said.slice(-8).map((l) => h("p", {}, l)));
+    fill(
+      lines,
+      m.said.slice(-8).map((l) => h("p", {}, l)),
+    );
     place.dataset.step = a?.step ?? "";
     place.dataset.moving = String(m.moving);
     button.disabled = !a || !mine;
@@ -107,43 +183,131 @@ export function ask(place) {
     if (!a) {
       over = null;
       button.classList.remove("down");
-      fill(shown, h("p", { class: "quiet" }, store.bar?.running ? t("The job works; no motion waits.") : t("No motion waits for a confirmation.")));
+      fill(
+        shown,
+        h(
+          "p",
+          { class: "quiet" },
+          store.bar?.running
+            ? t("The job works; no motion waits.")
+            : t("No motion waits for a confirmation."),
+        ),
+      );
       return;
     }
-    fill(shown, h("p", {}, h("b", {}, `${t(a.step)}: ${t(m.moving ? "moves" : a.question)}`)), a.says.map((s) => h("p", { class: "small" }, s)),
-      h("div", { class: "pose" }, a.labels.map((l, i) => { const [name, unit] = l.split(" "); return figure(num(a.numbers[i], unit === "mm" ? 3 : 4), `${name}${unit ? `, ${unit}` : ""}`); })),
-      h("p", { class: "small quiet" }, `${a.motions} ${t("motions")} · ${num(a.speed_mm_s, 0, "mm/s")} · ${t("flange, at the end")} · ${a.convention} · ${a.hash.slice(0, 12)}`),
-      h("details", {}, h("summary", {}, `${a.gates.length} ${t("gates kept")}`), a.gates.map(gate)));
+    fill(
+      shown,
+      h("p", {}, h("b", {}, `${t(a.step)}: ${t(m.moving ? "moves" : a.question)}`)),
+      a.says.map((s) => h("p", { class: "small" }, s)),
+      h(
+        "div",
+        { class: "pose" },
+        a.labels.map((l, i) => {
+          const [name, unit] = l.split(" ");
+          return figure(
+            num(a.numbers[i], unit === "mm" ? 3 : 4),
+            `${name}${unit ? `, ${unit}` : ""}`,
+          );
+        }),
+      ),
+      h(
+        "p",
+        { class: "small quiet" },
+        `${a.motions} ${t("motions")} · ${num(a.speed_mm_s, 0, "mm/s")} · ` +
+          `${t("flange, at the end")} · ${a.convention} · ${a.hash.slice(0, 12)}`,
+      ),
+      h("details", {}, h("summary", {}, `${a.gates.length} ${t("gates kept")}`), a.gates.map(gate)),
+    );
     if (down && a.stays_down && !m.moving) press();
   };
-  fill(place, shown, h("div", { class: "row hold-row" }, button, no), said, h("p", { class: "small quiet" }, t("It moves while the button is held, to what is shown, once. Let go to halt.")), lines);
+  fill(
+    place,
+    shown,
+    h("div", { class: "row hold-row" }, button, no),
+    said,
+    h(
+      "p",
+      { class: "small quiet" },
+      t("It moves while the button is held, to what is shown, once. Let go to halt."),
+    ),
+    lines,
+  );
   draw();
   const offs = [on("motion", draw), on("bar", draw), on("lost", () => store.lost && up())];
-  return () => { up(); offs.forEach((off) => off()); document.removeEventListener("visibilitychange", hidden); removeEventListener("blur", up); removeEventListener("pagehide", up); };
+  return () => {
+    up();
+    offs.forEach((off) => off());
+    document.removeEventListener("visibilitychange", hidden);
+    removeEventListener("blur", up);
+    removeEventListener("pagehide", up);
+  };
 }
 
 export function gate(g) {
-  return h("div", { class: "light" }, h("span", { class: `dot ${g.passed ? "good" : "bad"}`, role: "img", "aria-label": t(g.passed ? "kept" : "missed") }),
-    h("span", {}, t(g.name)), h("span", { class: "small num" }, h("b", {}, num(g.value, 3)), h("span", { class: "quiet" }, ` / ${num(g.limit, 3)}`)));
+  return h(
+    "div",
+    { class: "light" },
+    h("span", {
+      class: `dot ${g.passed ? "good" : "bad"}`,
+      role: "img",
+      "aria-label": t(g.passed ? "kept" : "missed"),
+    }),
+    h("span", {}, t(g.name)),
+    h(
+      "span",
+      { class: "small num" },
+      h("b", {}, num(g.value, 3)),
+      h("span", { class: "quiet" }, ` / ${num(g.limit, 3)}`),
+    ),
+  );
 }
 
 /** In the simulated cell: which component is in the gripper, where the arm was jogged. */
 export function inTheCell(place, overBoard, changed) {
   let before = null;
   const draw = () => {
-    const s = store.motion?.simulated, state = JSON.stringify([s, store.motion?.asked?.hash]);
+    const s = store.motion?.simulated,
+      state = JSON.stringify([s, store.motion?.asked?.hash]);
     if (!s || state === before) return;
     before = state;
     const said = h("div");
-    const put = (body) => attempt(async () => {
-      if (!operating()) await operate(false);
-      store.motion = await post("/simulated", body);
-      tell("motion");
-      changed?.(store.motion.simulated);
-    }, said);
-    fill(place, h("div", { class: "row" },
-      !overBoard && s.parts.map((p) => h("button", { "data-part": p, "aria-pressed": String(p === s.holds && !s.over_board), onclick: () => put({ holds: p }) }, p)),
-      overBoard && h("button", { id: "over-board", "aria-pressed": String(s.over_board), onclick: () => put({ over_board: true }) }, t("Jog over the board"))), said);
+    const put = (body) =>
+      attempt(async () => {
+        if (!operating()) await operate(false);
+        store.motion = await post("/simulated", body);
+        tell("motion");
+        changed?.(store.motion.simulated);
+      }, said);
+    fill(
+      place,
+      h(
+        "div",
+        { class: "row" },
+        !overBoard &&
+          s.parts.map((p) =>
+            h(
+              "button",
+              {
+                "data-part": p,
+                "aria-pressed": String(p === s.holds && !s.over_board),
+                onclick: () => put({ holds: p }),
+              },
+              p,
+            ),
+          ),
+        overBoard &&
+          h(
+            "button",
+            {
+              id: "over-board",
+              "aria-pressed": String(s.over_board),
+              onclick: () => put({ over_board: true }),
+            },
+            t("Jog over the board"),
+          ),
+      ),
+      said,
+    );
   };
   draw();
   return on("motion", draw);

@@ -1,4 +1,5 @@
-// In: the bar's message. Out: the bar that never leaves: where pictures come from, robot, stop, who operates, what is wrong.
+// In: the bar's message. Out: the bar that never leaves: where pictures come from, robot, stop, who
+// operates, what is wrong.
 
 import { post, tab } from "../base/api.js";
 import { fill, h, num } from "../base/dom.js";
@@ -6,7 +7,12 @@ import { t } from "../base/text.js";
 import { jobs, on, store, tell } from "../base/store.js";
 import { attempt } from "./problem.js";
 
-const ROBOT = { no_link: ["no link", ""], read_only: ["read-only", ""], armed: ["armed", "good"], moving: ["moving", "poor"] };
+const ROBOT = {
+  no_link: ["no link", ""],
+  read_only: ["read-only", ""],
+  armed: ["armed", "good"],
+  moving: ["moving", "poor"],
+};
 
 /** Whether this tab operates. */
 export const operating = () => store.bar?.lease.holder === tab.slice(0, 4);
@@ -27,8 +33,10 @@ export function bar(place) {
   fill(place, main, cells);
   const stop = h("button", { class: "stop", id: "stop", onclick: stopAll }, "STOP");
   const lease = h("button", { id: "lease", onclick: () => attempt(() => operate(true)) });
-  const mode = h("span", { class: "badge" }), name = h("span", { class: "bar-name" });
-  const robot = h("span", { class: "pill" }), laser = h("span", { class: "pill" });
+  const mode = h("span", { class: "badge" }),
+    name = h("span", { class: "bar-name" });
+  const robot = h("span", { class: "pill" }),
+    laser = h("span", { class: "pill" });
   const running = h("span", { class: "bar-job grow" });
   fill(main, mode, name, robot, laser, running, lease, stop);
   const draw = () => {
@@ -43,22 +51,57 @@ export function bar(place) {
     robot.textContent = `${t("Robot")}: ${t(word)}`;
     laser.textContent = `${t("Laser")}: ${b.laser === null ? t("not switched here") : t(b.laser ? "on" : "off")}`;
     laser.className = `pill ${b.laser ? "bad" : ""}`;
-    lease.textContent = operating() ? `✓ ${t("You operate")}` : b.lease.holder ? `${t("Take over from")} ${b.lease.holder}` : t("Operate");
+    lease.textContent = operating()
+      ? `✓ ${t("You operate")}`
+      : b.lease.holder
+        ? `${t("Take over from")} ${b.lease.holder}`
+        : t("Operate");
     lease.setAttribute("aria-pressed", String(operating()));
     const dropped = Object.values(b.frames.dropped).reduce((a, n) => a + n, 0);
-    const why = Object.entries(b.frames.dropped).map(([k, n]) => `${k}: ${n}`).join("\n");
+    const why = Object.entries(b.frames.dropped)
+      .map(([k, n]) => `${k}: ${n}`)
+      .join("\n");
     const c = b.calibration;
-    fill(cells,
-      cell(t("Frames"), `${b.frames.seen} / ${b.frames.measured} / ${dropped}`, `${t("in / measured / dropped")}\n${why}`),
-      cell(t("Delay"), b.delay_ms ? `${num(b.delay_ms[0], 0)} / ${num(b.delay_ms[1], 0)} ms` : "–", "p50 / p99"),
-      cell("GPU", b.adapter_is_software ? `${t("software")}, ${b.adapter}` : b.adapter, "", b.adapter_is_software ? "amber" : ""),
-      cell(t("Calibration"), c ? `${t(c.verdict)}${c.verdict === "good" ? "" : ` (${t(c.worst)})`}, ${age(c.days)}${c.expected_mm === null ? "" : `, ${num(c.expected_mm, 3)} mm`}` : t("missing"), "", c && c.verdict === "good" ? "" : "amber"),
+    fill(
+      cells,
+      cell(
+        t("Frames"),
+        `${b.frames.seen} / ${b.frames.measured} / ${dropped}`,
+        `${t("in / measured / dropped")}\n${why}`,
+      ),
+      cell(
+        t("Delay"),
+        b.delay_ms ? `${num(b.delay_ms[0], 0)} / ${num(b.delay_ms[1], 0)} ms` : "–",
+        "p50 / p99",
+      ),
+      cell(
+        "GPU",
+        b.adapter_is_software ? `${t("software")}, ${b.adapter}` : b.adapter,
+        "",
+        b.adapter_is_software ? "amber" : "",
+      ),
+      cell(
+        t("Calibration"),
+        c
+          ? `${t(c.verdict)}${c.verdict === "good" ? "" : ` (${t(c.worst)})`}, ${age(c.days)}` +
+              (c.expected_mm === null ? "" : `, ${num(c.expected_mm, 3)} mm`)
+          : t("missing"),
+        "",
+        c && c.verdict === "good" ? "" : "amber",
+      ),
       cell(t("Disk"), b.disk_left_gb === null ? "–" : num(b.disk_left_gb, 0, "GB")),
       store.lost && h("span", { class: "alarm", role: "alert" }, t("The program does not answer.")),
-      b.alarms.length > 0 && h("span", { class: "alarm", role: "alert", title: b.alarms.join("\n") }, `⚠ ${b.alarms.join(" · ")}`));
+      b.alarms.length > 0 &&
+        h(
+          "span",
+          { class: "alarm", role: "alert", title: b.alarms.join("\n") },
+          `⚠ ${b.alarms.join(" · ")}`,
+        ),
+    );
     work();
   };
-  const advance = h("progress"), count = h("span");
+  const advance = h("progress"),
+    count = h("span");
   let shown = null;
   const work = () => {
     const now = jobs((j) => j.state === "running")[0];
@@ -66,7 +109,10 @@ export function bar(place) {
       shown = now?.id;
       advance.removeAttribute("value");
       advance.setAttribute("aria-label", shown ?? "");
-      fill(running, now && [h("a", { href: `#/${pageOf(now)}?job=${shown}` }, shown), advance, count]);
+      fill(
+        running,
+        now && [h("a", { href: `#/${pageOf(now)}?job=${shown}` }, shown), advance, count],
+      );
     }
     if (!now) return;
     if (now.of) [advance.max, advance.value] = [now.of, now.done];
@@ -74,9 +120,12 @@ export function bar(place) {
   };
   on("bar", draw);
   on("lost", draw);
-  // How far a job is, is drawn with the rest of the bar, once a second: drawing it by itself costs two browsers on the station 1 % of two
-  // cores, which the job lacks. One that begins or ends is shown at once.
-  on("jobs", () => { if (jobs((j) => j.state === "running")[0]?.id !== shown) work(); });
+  // How far a job is, is drawn with the rest of the bar, once a second: drawing it by itself costs
+  // two browsers on the station 1 % of two cores, which the job lacks. One that begins or ends is
+  // shown at once.
+  on("jobs", () => {
+    if (jobs((j) => j.state === "running")[0]?.id !== shown) work();
+  });
   addEventListener("language", draw);
   draw();
 }
@@ -89,5 +138,18 @@ const age = (days) => (days < 1 ? t("today") : `${Math.round(days)} d`);
 
 /** Where a job is looked at. */
 export function pageOf(job) {
-  return { check: "station", tune: "picture", scan: "scan", filter: "surface", find: "position", teach: "part", touch: "touch", calibrate: "calibrate", joint: "calibrate", auto: "calibrate", insert: "position", benchmark: "health" }[job.order.procedure];
+  return {
+    check: "station",
+    tune: "picture",
+    scan: "scan",
+    filter: "surface",
+    find: "position",
+    teach: "part",
+    touch: "touch",
+    calibrate: "calibrate",
+    joint: "calibrate",
+    auto: "calibrate",
+    insert: "position",
+    benchmark: "health",
+  }[job.order.procedure];
 }

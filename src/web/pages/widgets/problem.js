@@ -8,10 +8,13 @@ import { on } from "../base/store.js";
 export function fault(e) {
   const p = e.problem ?? e;
   if (!p.what) console.warn(e);
-  return h("div", { class: "problem", role: "alert" },
+  return h(
+    "div",
+    { class: "problem", role: "alert" },
     h("b", {}, p.what ?? e.message ?? String(e)),
     p.cause && h("div", { class: "small" }, `${t("Likely cause")}: ${p.cause}`),
-    p.next && h("div", { class: "small" }, `${t("Next")}: ${p.next}`));
+    p.next && h("div", { class: "small" }, `${t("Next")}: ${p.next}`),
+  );
 }
 
 on("problem", (e) => {

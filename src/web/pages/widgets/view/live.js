@@ -1,23 +1,46 @@
-// In: the camera, maybe a job that found a part. Out: the camera's newest picture, small, again and again, with the part's outlines where the
-// robot's pose at that picture says; one that is slow gets fewer.
+// In: the camera, maybe a job that found a part. Out: the camera's newest picture, small, again and
+// again, with the part's outlines where the robot's pose at that picture says; one that is slow
+// gets fewer.
 
 import { bytes, get } from "../../base/api.js";
 import { fill, h } from "../../base/dom.js";
 import { t } from "../../base/text.js";
 
-/** Outlines that moved more than this between two readings of the robot's pose are drawn broken, px. */
+/**
+ * Outlines that moved more than this between two readings of the robot's pose are drawn broken, px.
+ */
 const MOVES = 1.5;
 const COLOUR = "#00e6ff";
 
-/** Shows it in `place` until what is given back is called. `of()` names the job whose part is drawn over it; null: none. `mark(g, width,
- * height)` draws what else lies over it. */
-export function livePicture(place, of = () => null, mark = () => {}) {
-  const canvas = h("canvas", { class: "live", width: 320, height: 240, role: "img", "aria-label": t("The camera's newest picture") });
-  const near = h("canvas", { class: "live", width: 480, height: 300, hidden: true, role: "img", "aria-label": t("The part, enlarged") }), said = h("p", { class: "small quiet" });
+/**
+ * Shows it in `place` until what is given back is called. `of()` names the job whose part is drawn
+ * over it; null: none. `mark(g, width, height)` draws what else lies over it.
+ */
+export function livePicture(place, of = () => null, mark = (_g, _width, _height) => {}) {
+  const canvas = h("canvas", {
+    class: "live",
+    width: 320,
+    height: 240,
+    role: "img",
+    "aria-label": t("The camera's newest picture"),
+  });
+  const near = h("canvas", {
+      class: "live",
+      width: 480,
+      height: 300,
+      hidden: true,
+      role: "img",
+      "aria-label": t("The part, enlarged"),
+    }),
+    said = h("p", { class: "small quiet" });
   fill(place, canvas, near, said);
   // Drawn by the processor, as in map.js.
   const g = canvas.getContext("2d", { willReadFrequently: true });
-  let over = false, number = 0, image = null, shown = null, refused = null;
+  let over = false,
+    number = 0,
+    image = null,
+    shown = null,
+    refused = null;
   const draw = (part) => {
     if (image) g.putImageData(image, 0, 0);
     canvas.dataset.number = String(number);
@@ -25,7 +48,13 @@ export function livePicture(place, of = () => null, mark = () => {}) {
     if (part) outlines(g, part, canvas.width);
     mark(g, canvas.width, canvas.height);
     near.hidden = !(part && enlarged(near, canvas, part));
-    said.textContent = part ? t(part.moved_px > MOVES ? "The arm moves: the part is drawn where it was a moment ago." : "Outlines: where the part was found, as this camera should see it. Beside the part: do not go.") : refused ?? "";
+    said.textContent = part
+      ? t(
+          part.moved_px > MOVES
+            ? "The arm moves: the part is drawn where it was a moment ago."
+            : "Outlines: where the part was found, as this camera should see it. Beside the part: do not go.",
+        )
+      : (refused ?? "");
   };
   /** The part over this picture; none where nobody knows: said why, once. */
   const ghost = async (job) => {
@@ -41,22 +70,27 @@ export function livePicture(place, of = () => null, mark = () => {}) {
   };
   (async () => {
     while (!over) {
-      const job = of(), b = await bytes(`/camera/newest?after=${number}`).catch(() => null);
+      const job = of(),
+        b = await bytes(`/camera/newest?after=${number}`).catch(() => null);
       if (over) return;
       if (!b || b.byteLength < 20) {
         // No newer picture: the part may have been found since this one.
-        if (number && of() !== shown) { shown = of(); draw(await ghost(shown)); }
+        if (number && of() !== shown) {
+          shown = of();
+          draw(await ghost(shown));
+        }
         await new Promise((go) => setTimeout(go, b ? 0 : 1000));
         continue;
       }
-      const [n, width, height, many] = new Uint32Array(b, 0, 4), grey = new Uint8Array(b, 20 + 12 * many);
+      const [n, width, height, many] = new Uint32Array(b, 0, 4),
+        grey = new Uint8Array(b, 20 + 12 * many);
       number = n;
       shown = job;
       // Picture and outlines appear together: of the same moment.
       const part = await ghost(job);
       if (over) return;
       const begun = performance.now();
-      if (image?.width !== width || image.height !== height) {
+      if (!image || image.width !== width || image.height !== height) {
         image = new ImageData(width, height);
         [canvas.width, canvas.height] = [width, height];
       }
@@ -65,33 +99,56 @@ export function livePicture(place, of = () => null, mark = () => {}) {
       draw(part);
       // A glance: what else the page does, a held button above all, comes first.
       await new Promise(requestAnimationFrame);
-      await new Promise((go) => setTimeout(go, Math.max(150, Math.min(2000, 3 * (performance.now() - begun)))));
+      await new Promise((go) =>
+        setTimeout(go, Math.max(150, Math.min(2000, 3 * (performance.now() - begun)))),
+      );
     }
   })();
   return () => (over = true);
 }
 
-/** The part's own corner of the picture; false where the picture shows it large enough, or not at all. */
+/**
+ * The part's own corner of the picture; false where the picture shows it large enough, or not at
+ * all.
+ */
 function enlarged(to, from, part) {
-  const span = (k, most) => { const v = part.lines.flat().map((p) => p[k]).filter((x) => x >= 0 && x < most); return v.length ? [Math.min(...v), Math.max(...v)] : null; };
+  const span = (k, most) => {
+    const v = part.lines
+      .flat()
+      .map((p) => p[k])
+      .filter((x) => x >= 0 && x < most);
+    return v.length ? [Math.min(...v), Math.max(...v)] : null;
+  };
   const [x, y] = [span(0, from.width), span(1, from.height)];
   if (!x || !y) return false;
   const wide = Math.max(1.6 * (x[1] - x[0]), (1.6 * (y[1] - y[0]) * to.width) / to.height, 60);
   if (wide > 0.6 * from.width) return false;
-  const high = (wide * to.height) / to.width, g = to.getContext("2d");
+  const high = (wide * to.height) / to.width,
+    g = to.getContext("2d");
   g.fillRect(0, 0, to.width, to.height);
-  g.drawImage(from, (x[0] + x[1] - wide) / 2, (y[0] + y[1] - high) / 2, wide, high, 0, 0, to.width, to.height);
+  g.drawImage(
+    from,
+    (x[0] + x[1] - wide) / 2,
+    (y[0] + y[1] - high) / 2,
+    wide,
+    high,
+    0,
+    0,
+    to.width,
+    to.height,
+  );
   return true;
 }
 
 /** Pixels' centres are whole numbers in what the server says, half ones on a canvas. */
 function outlines(g, part, width) {
   g.setLineDash(part.moved_px > MOVES ? [8, 8] : []);
-  for (const [colour, wide] of [["#000a", 4], [COLOUR, 1.6]]) {
-    g.strokeStyle = colour;
-    g.lineWidth = (wide * Math.max(width, 320)) / 640;
+  for (const dark of [true, false]) {
+    g.strokeStyle = dark ? "#000a" : COLOUR;
+    g.lineWidth = ((dark ? 4 : 1.6) * Math.max(width, 320)) / 640;
     g.beginPath();
-    for (const line of part.lines) line.forEach(([u, v], i) => (i ? g.lineTo(u + 0.5, v + 0.5) : g.moveTo(u + 0.5, v + 0.5)));
+    for (const line of part.lines)
+      line.forEach(([u, v], i) => (i ? g.lineTo(u + 0.5, v + 0.5) : g.moveTo(u + 0.5, v + 0.5)));
     g.stroke();
   }
   g.setLineDash([]);

@@ -1,0 +1,131 @@
+//! Names the pictures that are not of the camera as the others show it.
+
+use super::chance::{ln_sets, ln_tail};
+use super::change::{FREE, Kind};
+use super::pictures::Set;
+use super::search::{Linear, beforehand};
+use super::two::{Two, free_rows};
+use crate::calibrate::camera::intrinsics::{Observation, SolveOptions, Solved};
+use crate::camera::Flip;
+use crate::fault::Fault;
+
+/// Fewest pictures of which some can be told from the rest.
+const FEWEST: usize = 5;
+/// Probability at which chance may accuse a right set.
+const BY_CHANCE: f64 = 1e-4;
+/// Kinds that are tried: three with numbers, three flips.
+const KINDS: f64 = 6.0;
+/// Before it is solved for, a change must look so likely by this share of the logarithm.
+const WORTH_A_LOOK: f64 = 0.5;
+/// The second part's typical residual with its camera may be so many times the first's: what fits neither camera is
+/// no picture of another one.
+const EXPLAINED: f64 = 2.0;
+/// The second part's typical residual with the first's camera must be at least so many times that with its own. What
+/// lens model and print leave out favours another camera too: for 5 of 13 photographs of one real camera, a focal
+/// length 0.7 % longer gave 0.03 px in place of 0.05 (1.7 times). Photographs of two cameras gave 3.4 times.
+const CLEARLY: f64 = 2.5;
+
+/// Pictures that another camera took, or that were read out otherwise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Apart {
+    /// Indices.
+    pub which: Vec<usize>,
+    /// "turned by 180 degrees".
+    pub how: String,
+    /// Typical residuals of these pictures as they are and with that change, px.
+    pub misfit_px: [f64; 2],
+    cause: &'static str,
+}
+
+impl Apart {
+    /// Of one picture that is left out.
+    pub fn reason(&self) -> String {
+        let [is, then] = self.misfit_px;
+        format!("it fits the others' camera to {is:.2} px, and to {then:.2} px if it is {}; {}", self.how, self.cause)
+    }
+
+    /// Of a set that cannot be used.
+    pub fn fault(&self, pictures: &[Observation]) -> Fault {
+        const MOST: usize = 12;
+        let (count, all) = (self.which.len(), pictures.len());
+        let named: Vec<&str> = self.which.iter().take(MOST).map(|&i| pictures[i].name.as_str()).collect();
+        let more = if count > MOST { format!(" and {} more", count - MOST) } else { String::new() };
+        let half = if 2 * count == all { "; or the others were, and these are right" } else { "" };
+        let [is, then] = self.misfit_px;
+        Fault::input(format!(
+            "{count} of {all} pictures are not of the camera as the others show it: they fit it to {is:.2} px, and to \
+             {then:.2} px if they are {}: {}{more}{half}",
+            self.how,
+            named.join(", ")
+        ))
+        .cause(self.cause)
+        .next("calibrate from pictures that were taken in one way: leave these out, or turn them back, and try again")
+    }
+}
+
+/// The pictures that are apart from the others; `None` for a set of one camera that was read out in one way.
+pub fn apart(pictures: &[Observation], solved: &Solved, options: &SolveOptions) -> Option<Apart> {
+    if pictures.len() < FEWEST {
+        return None;
+    }
+    let (set, from) = Set::new(pictures, solved, options);
+    let all: Vec<usize> = (0..set.len()).collect();
+    let one = Two::solved(&set, &from, Kind::Same, vec![false; set.len()])?;
+    let variance = one.scales()[0].powi(2);
+    let told = set.look(&all, &one.stand.camera, &one.stand.shape, &one.stand.poses)?.told;
+    let prior = beforehand(&set, variance);
+    let mut best: Option<Tried> = None;
+    for kind in FREE {
+        let linear = Linear::new(&told, &prior, &free_rows(&set, &kind.directions(&set.like)))?;
+        let other = linear.best(variance);
+        let likely = -0.5 * linear.gain(&other) / variance;
+        if likely > WORTH_A_LOOK * limit(&other) {
+            continue;
+        }
+        let Some(two) = Two::solved(&set, &one.stand, kind, other) else { continue };
+        let mut tried = vec![judged(&set, &one, &two)];
+        // A flip moves the principal point, so that a free change of that looks likely first.
+        if kind != Kind::Focus && tried[0].as_ref().is_some_and(|t| t.chance < WORTH_A_LOOK * limit(&two.other)) {
+            let flips = Flip::ALL
+                .into_iter()
+                .filter_map(|flip| Two::solved(&set, &one.stand, Kind::Flip(flip), two.other.clone()));
+            tried.extend(flips.map(|two| judged(&set, &one, &two)));
+        }
+        best = tried.into_iter().flatten().filter(|t| t.sure).chain(best).max_by(|a, b| a.worth.total_cmp(&b.worth));
+    }
+    best.map(|b| b.apart)
+}
+
+/// Logarithm of the probability below which a part of the set is believed.
+fn limit(other: &[bool]) -> f64 {
+    BY_CHANCE.ln() - KINDS.ln() - ln_sets(other)
+}
+
+struct Tried {
+    /// Logarithm of the probability that chance explains it.
+    chance: f64,
+    sure: bool,
+    /// Half of the gain less what the change's numbers are worth by the count of the corners.
+    worth: f64,
+    apart: Apart,
+}
+
+fn judged(set: &Set, one: &Two, two: &Two) -> Option<Tried> {
+    let kind = two.kind;
+    let [scale, second] = two.scales();
+    let numbers = kind.directions(&set.like).ncols();
+    let (scatter, freedom) = two.scatter(set)?;
+    let gain = (one.cost(set, scale) - two.cost(set, scale)) / scatter;
+    let chance = ln_tail(gain, numbers.max(2), freedom);
+    let which: Vec<usize> = (0..set.len()).filter(|&i| two.other[i]).collect();
+    let alone = set.look(&which, &two.stand.camera, &two.stand.shape, &two.stand.poses);
+    let alone = alone.map_or(f64::INFINITY, |l| l.scale());
+    let explained = second < EXPLAINED * scale && alone > CLEARLY * second;
+    let px = set.sigma_px(&which);
+    Some(Tried {
+        chance,
+        sure: chance < limit(&two.other) && kind.is_visible(&two.change) && explained,
+        worth: 0.5 * gain - 0.5 * numbers as f64 * (set.coordinates() as f64).ln(),
+        apart: Apart { misfit_px: [alone * px, second * px], how: kind.words(&two.change), cause: kind.cause(), which },
+    })
+}
