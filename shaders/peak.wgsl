@@ -123,10 +123,18 @@ fn guess(profile: Profile) -> vec2<f32> {
     return vec2(m, max(1.25 * all / max(count, 1e-6), 1.0));
 }
 
-fn finish(at: vec2<i32>, n: vec2<f32>, m: f32, amplitude: f32, width: f32, sigma: f32, full: bool) -> Peak {
+// Where the centre lies that is m across from the pixel: in the middle of the window there. It is on the line, however the
+// direction errs.
+fn centre_at(at: vec2<i32>, m: f32) -> vec2<f32> {
+    let a = walk.lean * (m / walk.nb);
+    let b = (m - a * walk.na) / walk.nb;
+    return vec2<f32>(at) + select(vec2(b, a), vec2(a, b), walk.columns);
+}
+
+fn finish(centre: vec2<f32>, n: vec2<f32>, amplitude: f32, width: f32, sigma: f32, full: bool) -> Peak {
     var peak: Peak;
-    peak.u = f32(at.x) + m * n.x;
-    peak.v = f32(at.y) + m * n.y;
+    peak.u = centre.x;
+    peak.v = centre.y;
     peak.normal_u = n.x;
     peak.normal_v = n.y;
     peak.amplitude = amplitude;
@@ -312,7 +320,7 @@ fn gaussian(at: vec2<i32>) -> Peak {
     let noise = max(chi2 / free, (frame.belief + chi2) / (frame.belief + free));
     let sigma = sqrt(max(i11 * share * noise, 0.0));
     let own_width = sqrt(max(width * width - profile.blur2, 0.01 * frame.s0 * frame.s0));
-    return finish(at, n, m, a, own_width, sigma, clipped.x + clipped.y > 0.0);
+    return finish(centre_at(at, m), n, a, own_width, sigma, clipped.x + clipped.y > 0.0);
 }
 
 var<private> second: vec2<f32>;
@@ -361,7 +369,7 @@ fn centroid(at: vec2<i32>) -> Peak {
     let width = sqrt(max((profile.step * profile.step) * spread - profile.blur2, 0.0));
     let share = profile.square / (profile.weight * profile.weight);
     let sigma = abs(profile.step) * sqrt((noise2.x + noise2.y) * share) / max(all, 1e-6);
-    return finish(at, n, m, max(max(top.x, top.y), 1.0), width, sigma, clipped.x + clipped.y > 0.0);
+    return finish(centre_at(at, m), n, max(max(top.x, top.y), 1.0), width, sigma, clipped.x + clipped.y > 0.0);
 }
 
 fn derivative(at: vec2<i32>) -> Peak {
@@ -395,7 +403,7 @@ fn derivative(at: vec2<i32>) -> Peak {
     }
     let m = select(0.0, clamp(-d1 / d2, -frame.s0, frame.s0), d2 < 0.0);
     let width = sqrt(max(smooth_level / max(-d2, 1e-6) - sigma * sigma, 0.0));
-    return finish(c, n, m, max(bright, 1.0), width, sqrt(noise) / max(-d2, 1e-6), saturated);
+    return finish(vec2<f32>(c) + m * n, n, max(bright, 1.0), width, sqrt(noise) / max(-d2, 1e-6), saturated);
 }
 
 // The standard deviation if nothing shows in which part of the pixel the centre lies.
@@ -405,7 +413,7 @@ fn itself(at: vec2<i32>) -> Peak {
     let n = select(1.0, -1.0, frame.across_v < 0.0) * vec2(frame.across_u, frame.across_v);
     base = background(at.x, at.y, n);
     let here = level(at.x, at.y);
-    return finish(at, n, 0.0, max(here - base, 1.0), frame.s0, EVEN, here >= frame.full_scale);
+    return finish(vec2<f32>(at), n, max(here - base, 1.0), frame.s0, EVEN, here >= frame.full_scale);
 }
 
 // The first test that fails names the reason.

@@ -100,8 +100,9 @@ fn direction_at(x: i32, y: i32) -> vec2<f32> {
     let own2 = vec2(2.0 * n.x * n.y, n.y * n.y - n.x * n.x) / vec2(length2);
     let across = vec2(frame.across_u, frame.across_v);
     let rig2 = vec2(2.0 * across.x * across.y, across.y * across.y - across.x * across.x);
-    // None of it where the stripe lies 45 degrees off: that is no edge's doing.
-    let rig = DISUNITED * (other * other) * max(own2.x * rig2.x + own2.y * rig2.y, 0.0);
+    // Less of it where the stripe lies more than 45 degrees off, and none at 90: that is no edge's doing.
+    let near = min(1.0 + (own2.x * rig2.x + own2.y * rig2.y), 1.0);
+    let rig = DISUNITED * max(other * other - 1.0, 0.0) * near;
     let sine = own * own2.x + rig * rig2.x;
     let cosine = own * own2.y + rig * rig2.y;
     let both = sqrt(sine * sine + cosine * cosine);

@@ -36,6 +36,9 @@ fn floor_div(a: i32, b: i32) -> i32 {
     return (a - select(0, b - 1, a < 0)) / b;
 }
 
+// A window that would move by less than this from row to row, px, stands still.
+const STILL = 0.05;
+
 // The window of a profile: a counts along the image axis that the stripe is nearer to, b across it.
 struct Walk {
     columns: bool,
@@ -103,36 +106,63 @@ fn singles(line: vec4<f32>, row: f32, reach: i32) {
     }
 }
 
-// The word that a group of four begins in, and its next where two hold it.
-fn group_words(a: i32, b: f32) -> vec2<u32> {
-    let x = u32(clamp(a, 0, (frame.width - 1) & -4));
-    let y = u32(clamp(walk.b0 + i32(b), 0, frame.height - 1));
-    let word = first + y * frame.pitch + (x >> px_log2);
-    return vec2(image[word], image[word + select(1u, 0u, px_log2 == 2u)]);
+// Weight of the pixels i beside the skeleton's, in a window that stands still.
+fn weigh(i: vec4<f32>) -> vec4<u32> {
+    let f = max(vec4(1.0) - walk.fade * (i * i), vec4(0.0));
+    let g = vec4<u32>(vec4(127.0) * (f * f) + vec4(0.5));
+    return select(vec4(0u), g, abs(i) <= vec4(f32(walk.room)));
 }
 
-// The same of a wide stripe by columns, four at a time, as they lie in memory.
-fn fours(line: vec4<f32>, row: f32) {
-    let middle = line * walk.lean;
-    let left = (vec4(walk.a0) + vec4<i32>(pixel_of(middle)) + vec4(2 - 2 * frame.fours)) & vec4(-4);
-    for (var g = 0; g < frame.fours; g++) {
-        let a = left + vec4(4 * g);
-        let i0 = vec4<f32>(a - vec4(walk.a0));
-        let s = shift(i0 + vec4(1.5));
-        let b = s + line;
-        let x = group_words(a.x, b.x);
-        let y = group_words(a.y, b.y);
-        let z = group_words(a.z, b.z);
-        let w = group_words(a.w, b.w);
-        let begin = vec4(x.x, y.x, z.x, w.x);
-        let next = vec4(x.y, y.y, z.y, w.y);
-        for (var p = 0u; p < 4u; p++) {
-            let bits = 32u >> px_log2;
-            let word = select(begin, next, vec4((p >> px_log2) > 0u));
-            let level = (word >> vec4((p & ((1u << px_log2) - 1u)) * bits)) & vec4((1u << bits) - 1u);
-            let i = i0 + vec4(f32(p));
-            add(i, middle, (s + vec4(row)) * walk.nb + i * walk.na, level);
+// First pixel of a group of four beside the skeleton's.
+fn group(g: i32) -> f32 {
+    return f32(((walk.a0 + 2 - 2 * frame.fours) & -4) + 4 * g - walk.a0);
+}
+
+// What all samples of a wide stripe by columns have in common: weights, squared weights, weights times offset and its
+// square.
+fn alike(tall: f32) -> vec4<f32> {
+    var sums = vec4(0.0);
+    for (var row = 0.0; row < tall; row += 1.0) {
+        for (var g = 0; g < frame.fours; g++) {
+            let i = vec4(group(g)) + vec4(0.0, 1.0, 2.0, 3.0);
+            let weight = vec4<f32>(weigh(i));
+            let e = vec4((shift(vec4(i.x + 1.5)).x + row) * walk.nb) + i * walk.na;
+            let once = weight * e;
+            let twice_e = weight * (e * e);
+            sums += vec4((weight.x + weight.y) + (weight.z + weight.w), dot(weight, weight), (once.x + once.y) + (once.z
+                + once.w), (twice_e.x + twice_e.y) + (twice_e.z + twice_e.w));
         }
+    }
+    return sums;
+}
+
+// Of one row of a sample, pixels of a group of four: their light, and their clipped weights.
+fn four_of(x: u32, b: f32, g: vec4<u32>) -> vec2<u32> {
+    let y = u32(clamp(walk.b0 + i32(b), 0, frame.height - 1));
+    let word = first + y * frame.pitch + (x >> px_log2);
+    let begin = image[word];
+    let next = image[word + select(1u, 0u, px_log2 == 2u)];
+    let bytes = (vec4(begin) >> vec4(0u, 8u, 16u, 24u)) & vec4(0xffu);
+    let shorts = vec4(begin & 0xffffu, begin >> 16u, next & 0xffffu, next >> 16u);
+    let level = select(shorts, bytes, px_log2 == 2u);
+    let light = g * level;
+    let clip = select(vec4(0u), g, level >= vec4(u32(frame.full_scale)));
+    return vec2((light.x + light.y) + (light.z + light.w), (clip.x + clip.y) + (clip.z + clip.w));
+}
+
+// One row of four samples of a wide stripe whose window stands still, by columns, four at a time, as they lie in memory.
+fn fours(line: vec4<f32>) {
+    for (var g = 0; g < frame.fours; g++) {
+        let i = group(g);
+        let weight = weigh(vec4(i) + vec4(0.0, 1.0, 2.0, 3.0));
+        let b = shift(vec4(i + 1.5)) + line;
+        let x = u32(clamp(walk.a0 + i32(i), 0, (frame.width - 1) & -4));
+        let p = four_of(x, b.x, weight);
+        let q = four_of(x, b.y, weight);
+        let r = four_of(x, b.z, weight);
+        let s = four_of(x, b.w, weight);
+        lit += vec4(p.x, q.x, r.x, s.x);
+        full += vec4(p.y, q.y, r.y, s.y);
     }
 }
 
@@ -161,7 +191,7 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
     let last = select(vec2(frame.height - 1, frame.width - 1), vec2(frame.width - 1, frame.height - 1), columns);
     let na = select(n.y, n.x, columns);
     let nb = select(n.x, n.y, columns);
-    let lean = na * nb;
+    let lean = select(na * nb, 0.0, abs(na * nb) < STILL);
     let tall = f32(frame.rows);
     // At whole numbers rounding shall not decide.
     let held = min(f32(min(b0, last.y - b0)) * abs(nb) / max(abs(na), 1e-6), 8192.0);
@@ -178,7 +208,13 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
     var low = 0.0;
     var high = 0.0;
     let inner = min(reach, room);
-    let shared_by = select(0.0, 1.5, columns && frame.fours > 0);
+    // Pixel by pixel where the window moves from row to row: columns that share a shift would lie beside it.
+    let by_fours = columns && lean == 0.0 && frame.fours > 0;
+    let shared_by = select(0.0, 1.5, by_fours);
+    var of_all = vec4(0.0);
+    if by_fours {
+        of_all = alike(tall);
+    }
     for (var q = 0; q < quads; q++) {
         let k = vec4(f32(4 * q - 2 * quads)) + vec4(0.0, 1.0, 2.0, 3.0);
         lit = vec4(0u);
@@ -189,20 +225,20 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
         offsets2 = vec4(0.0);
         for (var row = 0.0; row < tall; row += 1.0) {
             let line = k * tall + vec4(row);
-            if columns && frame.fours > 0 {
-                fours(line, row);
+            if by_fours {
+                fours(line);
             } else {
                 singles(line, row, reach);
             }
         }
         // The samples go round: four leave at the front, the new ones come in at the end.
         turn_up(0); turn_up(1); turn_up(2); turn_up(3); turn_up(4); turn_up(5); turn_up(6); turn_up(7); turn_up(8);
-        let weight = vec4<f32>(weights);
+        let weight = select(vec4<f32>(weights), vec4(of_all.x), by_fours);
         levels[quads - 1] = vec4<f32>(lit) / weight;
         sums[quads - 1] = vec4<f32>(full) / weight;
-        let e = offsets / weight;
+        let e = select(offsets, vec4(of_all.z), by_fours) / weight;
         strays[quads - 1] = e;
-        let spread = offsets2 / weight - e * e;
+        let spread = select(offsets2, vec4(of_all.w), by_fours) / weight - e * e;
         spreads[quads - 1] = spread;
         let first_row = k * tall;
         let last_row = first_row + vec4(tall - 1.0);
@@ -215,7 +251,7 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
         line_all += vec3(dot(close, vec4(1.0)), dot(close, k), dot(close, k * k));
         line_off += vec2(dot(close, e), dot(close, k * e));
         near_sums += vec3(dot(close, spread), dot(close, weight), dot(close,
-            vec4<f32>(squares_of)));
+            select(vec4<f32>(squares_of), vec4(of_all.y), by_fours)));
     }
     // From a sample to the next, and at sample 0.
     let by = (line_all.x * line_off.y - line_all.y * line_off.x) / (line_all.x * line_all.z - line_all.y * line_all.y);

@@ -91,7 +91,7 @@ fn a_cut_moves_a_slanted_stripe_as_it_moves_a_lying_one() {
                     slanted / lying
                 );
                 println!("{line}");
-                if !(0.7..1.4).contains(&(slanted / lying)) {
+                if !(0.8..1.4).contains(&(slanted / lying)) {
                     faults.push(line);
                 }
             }

@@ -8,7 +8,7 @@ use super::across::direction::direction;
 use super::found::{Peak, SATURATED};
 use super::grey::{Grey, Inner, Place};
 use super::lanes::LANES;
-use super::profile::{Profiles, Seen};
+use super::profile::{Profiles, Seen, centre_at};
 use super::scoring;
 
 /// Nearer than so many pixels lies a narrow stripe's own light, more on the side that its centre is nearer to.
@@ -86,7 +86,7 @@ pub(super) fn gaussians<G: Grey>(
     for (lane, (place, Seen { at: (x, y), n, base, .. })) in places.iter().zip(seen).enumerate() {
         let [m, a, width, sigma, clipped] =
             [found.m, found.a, found.width, found.sigma, found.clipped].map(|v| v.0[lane]);
-        let peak = finish(x, y, n, m, a, base, width, sigma, clipped > 0.0, s);
+        let peak = finish(centre_at((x, y), n, m), n, a, base, width, sigma, clipped > 0.0, s);
         take(Peak { pixel: place.pixel, shot: place.shot, ..peak });
     }
 }
@@ -94,10 +94,8 @@ pub(super) fn gaussians<G: Grey>(
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn finish(
-    x: i32,
-    y: i32,
-    (nx, ny): (f32, f32),
-    m: f32,
+    (u, v): (f32, f32),
+    (normal_u, normal_v): (f32, f32),
     amplitude: f32,
     base: f32,
     width: f32,
@@ -106,10 +104,10 @@ pub(super) fn finish(
     s: &PeakFrame,
 ) -> Peak {
     Peak {
-        u: x as f32 + m * nx,
-        v: y as f32 + m * ny,
-        normal_u: nx,
-        normal_v: ny,
+        u,
+        v,
+        normal_u,
+        normal_v,
         amplitude,
         background: base,
         width_px: width,

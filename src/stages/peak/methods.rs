@@ -7,7 +7,7 @@ use super::fit::{background, finish, look};
 use super::found::Peak;
 use super::grey::{Grey, Place};
 use super::lanes::{Lanes, exponential};
-use super::profile::{Profiles, Seen, clipped_within, number, share};
+use super::profile::{Profiles, Seen, centre_at, clipped_within, number, share};
 
 /// Centre of gravity of the light above the background, within three widths of a first guess.
 #[inline(always)]
@@ -53,7 +53,7 @@ pub(super) fn centroids<G: Grey>(
     let sigma = profiles.step.map(f32::abs) * ((noise[0] + noise[1]) * share).sqrt() / least;
     for (lane, (place, Seen { at: (x, y), n, base, .. })) in places.iter().zip(seen).enumerate() {
         let [m, top, width, sigma, clipped] = [m, top, width, sigma, clipped].map(|v| v.0[lane]);
-        let peak = finish(x, y, n, m, top.max(1.0), base, width, sigma, clipped > 0.0, s);
+        let peak = finish(centre_at((x, y), n, m), n, top.max(1.0), base, width, sigma, clipped > 0.0, s);
         take(Peak { pixel: place.pixel, shot: place.shot, ..peak });
     }
 }
@@ -106,7 +106,8 @@ fn derivative<G: Grey>(image: G, m0: f32, Seen { at: (x, y), n, base, .. }: Seen
     let m = if d2 < 0.0 { (-d1 / d2).clamp(-s.s0, s.s0) } else { 0.0 };
     // For a Gaussian line the curvature over the value of the smoothed profile is -1 / (w² + sigma²).
     let width = (smooth / (-d2).max(1e-6) - sigma * sigma).max(0.0).sqrt();
-    finish(cx, cy, n, m, top.max(1.0), base, width, noise.sqrt() / (-d2).max(1e-6), saturated, s)
+    let centre = (cx as f32 + m * n.0, cy as f32 + m * n.1);
+    finish(centre, n, top.max(1.0), base, width, noise.sqrt() / (-d2).max(1e-6), saturated, s)
 }
 
 /// A pixel's position where nothing says in which part of it the centre lies: the standard deviation of an even
@@ -121,6 +122,6 @@ pub(super) fn pixel<G: Grey>(place: &Place<G>, s: &PeakFrame) -> Peak {
     let n = (sign * s.across_u, sign * s.across_v);
     let (base, _) = background(image, x, y, n.0, n.1, s);
     let level = image.level(x, y);
-    let peak = finish(x, y, n, 0.0, (level - base).max(1.0), base, s.s0, EVEN, level >= s.full_scale, s);
+    let peak = finish((x as f32, y as f32), n, (level - base).max(1.0), base, s.s0, EVEN, level >= s.full_scale, s);
     Peak { pixel: place.pixel, shot: place.shot, ..peak }
 }

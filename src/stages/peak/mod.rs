@@ -12,7 +12,7 @@ mod measure;
 pub(in crate::stages) mod methods;
 mod noise;
 pub mod params;
-mod profile;
+pub(in crate::stages) mod profile;
 pub(in crate::stages) mod scoring;
 mod stage;
 mod twin;

@@ -37,6 +37,8 @@ pub(super) struct Profiles {
     /// Level beside the stripe, and the square of what it differs by from side to side.
     pub base: Lanes,
     pub uneven2: Lanes,
+    /// Kept from one profile to the next.
+    columns: Vec<Column>,
 }
 
 /// What is known of a place before its profile is fitted.
@@ -55,6 +57,29 @@ pub(super) struct Seen {
 /// Columns where the stripe is nearer to the horizontal, else rows; at 45 degrees rounding shall not decide.
 pub(super) fn by_columns((nx, ny): (f32, f32)) -> bool {
     1.001 * ny >= nx.abs()
+}
+
+/// A window that would move by less than this from row to row, px, stands still: its flanks are then of places up to a
+/// sixth of a width beside its middle, and all its samples have the same columns.
+pub(in crate::stages) const STILL: f32 = 0.05;
+
+/// By how much the middle of a window along the stripe moves along a from row to row.
+#[inline(always)]
+fn lean(na: f32, nb: f32) -> f32 {
+    let lean = na * nb;
+    if lean.abs() < STILL { 0.0 } else { lean }
+}
+
+/// Where a centre lies in the picture that is `m` px across from a pixel: in the middle of the window there. It is on the
+/// line, however the direction errs.
+#[inline(always)]
+pub(super) fn centre_at((x, y): (i32, i32), n: (f32, f32), m: f32) -> (f32, f32) {
+    let columns = by_columns(n);
+    let (na, nb) = if columns { n } else { (n.1, n.0) };
+    let a = lean(na, nb) * (m / nb);
+    let b = (m - a * na) / nb;
+    let (du, dv) = if columns { (a, b) } else { (b, a) };
+    (x as f32 + du, y as f32 + dv)
 }
 
 /// How far a window may reach to both sides along a: no farther than the picture on one of them, as an error of the
@@ -110,6 +135,14 @@ struct Window {
     full_scale: i32,
 }
 
+/// A column of a window, or four of them: their first beside the skeleton's pixel, by how much they follow the line, and
+/// their weights.
+struct Column {
+    i: i32,
+    shift: i32,
+    weights: [i32; 4],
+}
+
 /// Weighted sums over the pixels of a sample.
 #[derive(Clone, Copy, Default)]
 struct Gathered {
@@ -142,7 +175,7 @@ impl Window {
         let columns = by_columns((nx, ny));
         let (na, nb) = if columns { (nx, ny) } else { (ny, nx) };
         let (a0, b0, width, height) = if columns { (x, y, s.width, s.height) } else { (y, x, s.height, s.width) };
-        let lean = na * nb;
+        let lean = lean(na, nb);
         // Between two pixels the middle may be half of one off them.
         let off = (lean.abs() * s.half_across * s.rows as f32).min(0.5);
         Window {
@@ -201,26 +234,71 @@ impl Window {
         sums
     }
 
-    /// The same of a wide stripe by columns, four at a time, as they lie in memory.
+    /// The columns of a window that stands still, which are the same for all samples: a wide stripe's four at a time, as
+    /// they lie in memory.
     #[inline(always)]
-    fn fours<G: Grey>(&self, image: G, k: i32, fours: i32) -> Gathered {
+    fn columns(&self, fours: i32, columns: &mut Vec<Column>) {
+        columns.clear();
+        let weight = |i: i32| self.weight(i, (0.0, 0));
+        if fours == 0 {
+            columns.extend((-self.reach..=self.reach).map(|i| Column {
+                i,
+                shift: self.shift(i as f32),
+                weights: [weight(i), 0, 0, 0],
+            }));
+        } else {
+            let left = (self.a0 - 2 * fours + 2) & !3;
+            columns.extend((left..left + 4 * fours).step_by(4).map(|a| {
+                let i = a - self.a0;
+                Column {
+                    i,
+                    shift: self.shift(i as f32 + 1.5),
+                    weights: [weight(i), weight(i + 1), weight(i + 2), weight(i + 3)],
+                }
+            }));
+        }
+    }
+
+    /// What all samples of a window that stands still have in common: all but their light.
+    #[inline(always)]
+    fn alike(&self, columns: &[Column]) -> Gathered {
         let mut sums = Gathered::default();
         for row in 0..self.tall {
-            let line = k * self.tall + row;
-            let middle = self.middle(line);
-            let left = (self.a0 + middle.1 - 2 * fours + 2) & !3;
-            for a in (left..left + 4 * fours).step_by(4) {
-                let i = a - self.a0;
-                let shift = self.shift(i as f32 + 1.5);
-                let row_at = (self.b0 + shift + line).clamp(0, self.last.1);
-                let levels = image.four(a.clamp(0, self.last.0 & !3), row_at);
-                for (i, level) in (i..).zip(levels) {
-                    let e = (shift + row) as f32 * self.nb + i as f32 * self.na;
-                    sums.add(self.weight(i, middle), e, level, self.full_scale);
+            for &Column { i, shift, weights } in columns {
+                for (i, g) in (i..).zip(weights) {
+                    sums.add(g, (shift + row) as f32 * self.nb + i as f32 * self.na, 0, self.full_scale);
                 }
             }
         }
         sums
+    }
+
+    /// The light of sample k of a window that stands still: all else is as `alike`.
+    #[inline(always)]
+    fn still<G: Grey>(&self, image: G, k: i32, fours: bool, columns: &[Column], alike: &Gathered) -> Gathered {
+        let (mut levels, mut clipped) = (0, 0);
+        for row in 0..self.tall {
+            let line = self.b0 + k * self.tall + row;
+            if !fours {
+                for &Column { i, shift, weights: [g, ..] } in columns {
+                    let (a, b) = (self.a0 + i, line + shift);
+                    let level = if self.columns { image.whole(a, b) } else { image.whole(b, a) };
+                    levels += g * level;
+                    clipped += if level >= self.full_scale { g } else { 0 };
+                }
+            } else {
+                for &Column { i, shift, weights: g } in columns {
+                    let a = (self.a0 + i).clamp(0, self.last.0 & !3);
+                    let [p, q, r, s] = image.four(a, (line + shift).clamp(0, self.last.1));
+                    levels += (g[0] * p + g[1] * q) + (g[2] * r + g[3] * s);
+                    if p.max(q).max(r.max(s)) >= self.full_scale {
+                        let full = |level: i32, g: i32| if level >= self.full_scale { g } else { 0 };
+                        clipped += (full(p, g[0]) + full(q, g[1])) + (full(r, g[2]) + full(s, g[3]));
+                    }
+                }
+            }
+        }
+        Gathered { levels, clipped, ..*alike }
     }
 
     /// Whether all pixels of sample k lie in the picture that have weight: those at the window's ends do. Columns that
@@ -300,6 +378,7 @@ impl Profiles {
             blur2: zero,
             base: zero,
             uneven2: zero,
+            columns: Vec::new(),
         }
     }
 
@@ -307,16 +386,21 @@ impl Profiles {
     #[inline(always)]
     pub fn put<G: Grey>(&mut self, lane: usize, image: G, seen: &Seen, s: &PeakFrame) {
         let window = Window::new(seen, s);
-        let fours = if window.columns { s.fours } else { 0 };
+        let still = window.lean == 0.0;
+        let fours = if still && window.columns { s.fours } else { 0 };
         let step = window.tall as f32 * window.nb;
+        let alike = still.then(|| {
+            window.columns(fours, &mut self.columns);
+            window.alike(&self.columns)
+        });
         let mut off = Off::default();
         let (mut low, mut high) = (0, 0);
         let half = self.half;
         for (side, j) in (0..2).flat_map(|side| (0..half).map(move |j| (side, j))) {
             let k = number(side, j);
-            let sample = match fours {
-                0 => window.singles(image, k as i32),
-                fours => window.fours(image, k as i32, fours),
+            let sample = match &alike {
+                Some(alike) => window.still(image, k as i32, fours > 0, &self.columns, alike),
+                None => window.singles(image, k as i32),
             };
             let scale = 1.0 / sample.weight as f32;
             self.levels[side][j].0[lane] = sample.levels as f32 * scale;

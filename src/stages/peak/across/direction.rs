@@ -84,8 +84,9 @@ fn direction_at<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) 
     let (s2, c2) = (2.0 * nx * ny / length2, (ny * ny - nx * nx) / length2);
     let (across_u, across_v) = (s.across_u, s.across_v);
     let (rig_s2, rig_c2) = (2.0 * across_u * across_v, across_v * across_v - across_u * across_u);
-    // None of it where the stripe lies 45 degrees off: that is no edge's doing.
-    let rig = DISUNITED * (other * other) * (s2 * rig_s2 + c2 * rig_c2).max(0.0);
+    // Less of it where the stripe lies more than 45 degrees off, and none at 90: that is no edge's doing.
+    let near = (1.0 + (s2 * rig_s2 + c2 * rig_c2)).min(1.0);
+    let rig = DISUNITED * (other * other - 1.0).max(0.0) * near;
     let (sine, cosine) = (one * s2 + rig * rig_s2, one * c2 + rig * rig_c2);
     let both = (sine * sine + cosine * cosine).sqrt();
     let (nx, ny) = if cosine > 0.0 { (sine, cosine + both) } else { (both - cosine, sine) };
