@@ -182,8 +182,10 @@ fn seen(r: &Report) -> String {
             c.shapes
         );
     }
-    if let Some(d) = r.disagreement_mm {
-        s += &format!("  the two-pin construction and the lattice fit disagree by {d:.3} mm\n");
+    if let (Some(d), Some(noise)) = (r.disagreement_mm, r.disagreement_noise_mm) {
+        s += &format!(
+            "  the two-pin construction and the lattice fit disagree by {d:.3} mm; their noise explains {noise:.3} mm\n"
+        );
     }
     s
 }

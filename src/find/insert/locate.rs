@@ -278,9 +278,9 @@ fn conclude(
     let mut budget = budget(points, &part.measured, rig, recipe)?;
     part.constructions.iter().filter(|b| b.name == spec.construction).for_each(|b| budget.built(b));
     let sizes = size_check(&budget, recipe);
-    let disagreement_mm = disagreement(recipe, &part.constructions);
+    let disagreement = disagreement(recipe, &part.constructions);
     let lead = lead(points, map, recipe, &part.found, &part.measured.base_from_part, &part.agreement);
-    let mut gates = gates(&recipe.gates, &part, lead, &budget, disagreement_mm);
+    let mut gates = gates(&recipe.gates, &part, lead, &budget, disagreement);
     // Where another look says where the part lies, no other place is in question: the looks have to agree.
     gates.retain(|g| options.expected.is_none() || g.name != "margin");
     gates.extend(sizes.as_ref().map(|s| s.gate(&recipe.gates)));
@@ -313,7 +313,8 @@ fn conclude(
         agreement,
         turns,
         constructions,
-        disagreement_mm,
+        disagreement_mm: disagreement.map(|(apart, _)| apart),
+        disagreement_noise_mm: disagreement.map(|(_, noise)| noise),
         edges: measured.edges,
         edge_rms_mm: measured.edge_rms,
         surface_points: measured.surface_points,
@@ -328,11 +329,19 @@ fn conclude(
     })
 }
 
-/// Distance between the two-pin construction and the lattice, mm; `None` where one of them is missing.
-fn disagreement(recipe: &Recipe, constructions: &[Built]) -> Option<f64> {
+/// Distance between the two-pin construction and the lattice, mm, and what their own noise makes expect of it; `None`
+/// where one of them is missing.
+fn disagreement(recipe: &Recipe, constructions: &[Built]) -> Option<(f64, f64)> {
     let named = |name: &Option<String>| constructions.iter().find(|b| Some(&b.name) == name.as_ref());
     let (a, b) = (named(&recipe.insertion.two_pin)?, named(&recipe.insertion.lattice)?);
-    Some((a.deviation_mm[0] - b.deviation_mm[0]).hypot(a.deviation_mm[1] - b.deviation_mm[1]))
+    let apart = (a.deviation_mm[0] - b.deviation_mm[0]).hypot(a.deviation_mm[1] - b.deviation_mm[1]);
+    // Sigmas are along each axis.
+    Some((apart, std::f64::consts::SQRT_2 * a.measured.sigma_mm.hypot(b.measured.sigma_mm)))
+}
+
+/// What a distance is on average beyond what noise makes of it.
+fn beyond_noise((apart, noise): (f64, f64)) -> f64 {
+    (apart * apart - noise * noise).max(0.0).sqrt()
 }
 
 /// A construction's deviation moves the part's pose in its plane: the nominal place comes to lie on the measured one.
@@ -428,7 +437,7 @@ fn missed(gates: &[Gate]) -> impl Iterator<Item = String> {
 }
 
 /// What the recipe asks of a part and of the pose that was measured.
-fn gates(g: &Gates, part: &Examined, lead: f64, budget: &Budget, disagreement: Option<f64>) -> Vec<Gate> {
+fn gates(g: &Gates, part: &Examined, lead: f64, budget: &Budget, disagreement: Option<(f64, f64)>) -> Vec<Gate> {
     let (least, most, agreement) = (Gate::least, Gate::most, &part.agreement);
     let mut out = vec![
         least("score", part.found.score, g.min_score),
@@ -441,7 +450,7 @@ fn gates(g: &Gates, part: &Examined, lead: f64, budget: &Budget, disagreement: O
         most("sigma_deg", budget.sigma_deg.iter().copied().fold(0.0, f64::max), g.max_sigma_deg),
     ];
     if let Some(d) = disagreement {
-        out.push(most("disagreement_mm", d, g.max_disagreement_mm));
+        out.push(most("disagreement_mm", beyond_noise(d), g.max_disagreement_mm));
     }
     if g.turn_must_be_told {
         out.extend(part.turns.iter().map(TurnVote::gate));
@@ -457,6 +466,14 @@ mod tests {
     use super::*;
     use crate::scan::Along;
     use std::path::Path;
+
+    /// 0.25 mm between constructions that each scatter by 0.12 mm is 0.18 mm on average beyond their noise.
+    #[test]
+    fn noise_is_no_disagreement() {
+        assert!((beyond_noise((0.25, 0.12 * std::f64::consts::SQRT_2)) - 0.183).abs() < 1e-3);
+        assert_eq!(beyond_noise((0.1, 0.17)), 0.0);
+        assert_eq!(beyond_noise((2.54, 0.0)), 2.54);
+    }
 
     /// The clock oscillator's socket by its recipe, 3 mm above a table, with as few points where its two turns
     /// differ: in the corner that is cut, and in the one across from it.

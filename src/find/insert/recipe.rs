@@ -145,7 +145,7 @@ pub struct Gates {
     pub min_edges: f64,
     /// Largest share of the drawn edges beyond which the surface goes on, 0 to 1.
     pub max_crossed: f64,
-    /// Largest disagreement between the two-pin construction and the lattice fit, mm.
+    /// Largest disagreement between the two-pin construction and the lattice fit beyond their own noise, mm.
     pub max_disagreement_mm: f64,
     /// False lets a part pass whose alike turns could not be told apart.
     pub turn_must_be_told: bool,

@@ -79,6 +79,9 @@ pub struct Report {
     pub constructions: Vec<Built>,
     /// Distance between the two-pin construction and the lattice fit, mm.
     pub disagreement_mm: Option<f64>,
+    /// What the noise of the two makes expect of that distance, mm.
+    #[serde(default)]
+    pub disagreement_noise_mm: Option<f64>,
     /// Number of surface ends at the drawn edges that were measured.
     pub edges: usize,
     /// Robust deviation of these ends from the drawn edges, mm.
