@@ -123,8 +123,8 @@ fn guess(profile: Profile) -> vec2<f32> {
     return vec2(m, max(1.25 * all / max(count, 1e-6), 1.0));
 }
 
-// Where the centre lies that is m across from the pixel: in the middle of the window there. It is on the line, however the
-// direction errs.
+// Where the centre lies that is m across from the pixel: in the middle of the window there. It is on the line, however
+// the direction errs.
 fn centre_at(at: vec2<i32>, m: f32) -> vec2<f32> {
     let a = walk.lean * (m / walk.nb);
     let b = (m - a * walk.na) / walk.nb;

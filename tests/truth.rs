@@ -150,9 +150,10 @@ fn scans_under_a_slanted_stripe_meet_their_bars() {
         scan(&inputs.join(set), &station, "auto", &out);
         sets.insert(set.into(), serde_json::json!({"cloud": format!("{set}/cloud.ply")}));
         let recipe = format!("{}/data/recipes/{}.toml", env!("CARGO_MANIFEST_DIR"), set.trim_start_matches("scan_"));
-        let [from, report] = [out.clone(), out.join("found.json")].map(|p| p.to_str().unwrap().to_owned());
+        let [from, report] = [out.clone(), out.with_extension("json")].map(|p| p.to_str().unwrap().to_owned());
         sheetlight(&["find", &from, "--recipe", &recipe, "--station", &station, "--out", &report, "--quiet"]);
-        let json = |path: &Path| -> serde_json::Value { serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap() };
+        let json =
+            |path: &Path| -> serde_json::Value { serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap() };
         let number = |value: &serde_json::Value| value.as_f64().expect("a number");
         let known = json(&truth.join(set).join("truth.json"))["base_T_part"].clone();
         let found = json(Path::new(&report))["poses"]["insertion"]["base_from_tool"].clone();

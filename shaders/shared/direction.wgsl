@@ -24,7 +24,8 @@ const TWO = 36;
 const FAR = 16;
 const NONE = 64;
 
-// How much the rig's direction counts where the gradients agree as badly as those of a straight stripe.
+// How much the rig's direction counts beside the gradients, for the square of how much worse than a straight stripe's
+// they agree.
 const DISUNITED = 0.04;
 
 // The structure tensor from 13 gradients on 24 grey levels, every other place of a lattice, in whole numbers: half

@@ -150,7 +150,7 @@ fn four_of(x: u32, b: f32, g: vec4<u32>) -> vec2<u32> {
     return vec2((light.x + light.y) + (light.z + light.w), (clip.x + clip.y) + (clip.z + clip.w));
 }
 
-// One row of four samples of a wide stripe whose window stands still, by columns, four at a time, as they lie in memory.
+// One row of four samples of a wide stripe whose window stands still: columns four at a time, as they lie in memory.
 fn fours(line: vec4<f32>) {
     for (var g = 0; g < frame.fours; g++) {
         let i = group(g);

@@ -1,8 +1,7 @@
 //! In: the pictures' layout, the settings of peaks and their choice. Out: the uniform block of the stages lines and
 //! peak, every size worked out once. Frame and unit: pixels, grey levels of the picture's depth.
 
-use super::across::direction::deep;
-use super::across::turn::{WEIGHTS, flattest, turn};
+use super::across::turn::{WEIGHTS, deep, flattest, turn};
 use super::params::{PeakParams, SAMPLES};
 use crate::gpu::Field;
 use crate::stages::frame::px_log2;

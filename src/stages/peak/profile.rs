@@ -70,8 +70,8 @@ fn lean(na: f32, nb: f32) -> f32 {
     if lean.abs() < STILL { 0.0 } else { lean }
 }
 
-/// Where a centre lies in the picture that is `m` px across from a pixel: in the middle of the window there. It is on the
-/// line, however the direction errs.
+/// Where a centre lies in the picture that is `m` px across from a pixel: in the middle of the window there. It is on
+/// the line, however the direction errs.
 #[inline(always)]
 pub(super) fn centre_at((x, y): (i32, i32), n: (f32, f32), m: f32) -> (f32, f32) {
     let columns = by_columns(n);
@@ -135,7 +135,7 @@ struct Window {
     full_scale: i32,
 }
 
-/// A column of a window, or four of them: their first beside the skeleton's pixel, by how much they follow the line, and
+/// A column of a window, or four of them: the first beside the skeleton's pixel, by how much they follow the line,
 /// their weights.
 struct Column {
     i: i32,
@@ -234,8 +234,8 @@ impl Window {
         sums
     }
 
-    /// The columns of a window that stands still, which are the same for all samples: a wide stripe's four at a time, as
-    /// they lie in memory.
+    /// The columns of a window that stands still, which are the same for all samples: a wide stripe's four at a time,
+    /// as they lie in memory.
     #[inline(always)]
     fn columns(&self, fours: i32, columns: &mut Vec<Column>) {
         columns.clear();

@@ -1,7 +1,7 @@
 //! In: a picture, a skeleton pixel. Out: the unit vector across the stripe there.
 //! Frame and unit: pixels. docs/math.md, Stripe peak (1).
 
-use super::turn::{DIAGONAL, EVEN_ROW, MIDDLE_ROW};
+use super::turn::{DIAGONAL, EVEN_ROW, MIDDLE_ROW, deep};
 use crate::stages::peak::PeakFrame;
 use crate::stages::peak::grey::Grey;
 
@@ -11,9 +11,9 @@ pub(in crate::stages) const BORDER_STEPS: u32 = 2;
 /// the border.
 pub(in crate::stages) const LEAVES: f32 = 0.3;
 
-/// How much the rig's direction counts where the gradients agree as badly as those of a straight stripe do, as a share
-/// of theirs; it counts by the square. Two surfaces, an end or print in the window leave 2 to 20 times as much, and turn
-/// the direction by 5 to 50 degrees where they cut the stripe aslant.
+/// How much the rig's direction counts beside the gradients, for the square of how much worse than a straight stripe's
+/// they agree. Two surfaces, an end or print in the window make them 2 to 20 times as bad, and turn the direction by 5
+/// to 50 degrees where they cut the stripe aslant.
 pub(in crate::stages) const DISUNITED: f32 = 0.04;
 
 /// Direction across the stripe. Beside the picture's border differences reach beyond it, where all levels go on as on
@@ -45,11 +45,6 @@ fn inward(x: i32, y: i32, n: (f32, f32), s: &PeakFrame) -> (i32, i32) {
     let along = if by_u.abs() >= by_v.abs() { by_u } else { by_v };
     // Not 0.5: rounding would decide.
     (x + (along * tu + 0.47).floor() as i32, y + (along * tv + 0.47).floor() as i32)
-}
-
-/// By how many bits gradients of a picture with this level of saturation are shortened to ten.
-pub(in crate::stages::peak) fn deep(full_scale: f32) -> u32 {
-    (full_scale as u32).count_ones().max(10) - 10
 }
 
 /// The strongest eigenvector of the structure tensor, on grey levels so far apart that noise
@@ -108,9 +103,8 @@ fn even<G: Grey>(image: G, x: i32, y: i32, u: i32) -> [i32; 4] {
 }
 
 /// Half the difference of the diagonal, the other element, half the difference of the eigenvalues and half their sum.
-/// Sums of whole
-/// numbers, of ten bits a gradient: which pixels a profile is made of hangs on the direction, and must not hang on
-/// rounding.
+/// Sums of whole numbers, of ten bits a gradient: which pixels a profile is made of hangs on the direction, and must
+/// not hang on rounding.
 #[inline(always)]
 fn tensor<G: Grey>(image: G, x: i32, y: i32, u: i32, v: i32, deep: u32) -> (f32, f32, f32, f32) {
     let half = 1 << deep >> 1;

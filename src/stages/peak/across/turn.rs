@@ -92,3 +92,8 @@ const GRADIENTS: [(i32, i32, i32); 13] = [
     (-2, 2, EVEN_ROW[0]),
     (2, 2, EVEN_ROW[2]),
 ];
+
+/// By how many bits gradients of a picture with this level of saturation are shortened to ten.
+pub(in crate::stages::peak) fn deep(full_scale: f32) -> u32 {
+    (full_scale as u32).count_ones().max(10) - 10
+}
