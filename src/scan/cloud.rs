@@ -233,6 +233,7 @@ pub struct CloudFile {
     path: PathBuf,
     count: u64,
     start: u64,
+    frame: &'static str,
 }
 
 impl CloudFile {
@@ -246,17 +247,21 @@ impl CloudFile {
                 .next("give the cloud.ply of a sheetlight scan")
         };
         let head = head_of(&mut file).map_err(|e| Fault::read(path, e))?;
-        let Head { count, length: start, .. } =
+        let Head { count, length: start, frame } =
             head.ok_or_else(|| strange("is too short for a cloud, or has another header"))?;
         let needed = count.saturating_mul(RECORD).saturating_add(start);
         if length != needed {
             return Err(strange(&format!("is {length} bytes long, {count} points need {needed}")));
         }
-        Ok(CloudFile { path: path.to_owned(), count, start })
+        Ok(CloudFile { path: path.to_owned(), count, start, frame })
     }
     /// Points in the file.
     pub fn count(&self) -> u64 {
         self.count
+    }
+    /// The frame that the header names.
+    pub fn frame(&self) -> &'static str {
+        self.frame
     }
 }
 

@@ -1,5 +1,6 @@
 //! In: a cloud, in memory or on disk. Out: a binary PCD (Point Cloud Library), streamed.
-//! Frame and unit: base frame, mm; the PLY's fields under the names that PCL viewers know.
+//! Frame and unit: the cloud's frame, mm, both in the header's second comment; the PLY's fields under the names that
+//! PCL viewers know.
 
 use super::{CloudPoint, PointSource};
 use crate::fault::{Fault, Result};
@@ -20,10 +21,10 @@ const FIELDS: [(&str, &str); 9] = [
 ];
 
 /// [PCD file format, pointclouds.org, version 0.7]
-fn header(count: u64) -> String {
+fn header(count: u64, frame: &str) -> String {
     let of = |what: fn(&(&'static str, &'static str)) -> &'static str| FIELDS.each_ref().map(what).join(" ");
     format!(
-        "# .PCD v.7 - Point Cloud Data file format\nVERSION .7\nFIELDS {}\nSIZE {}\nTYPE {}\nCOUNT {}\n\
+        "# .PCD v.7 - Point Cloud Data file format\n# sheetlight cloud, {frame} frame, mm\nVERSION .7\nFIELDS {}\nSIZE {}\nTYPE {}\nCOUNT {}\n\
          WIDTH {count}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\nDATA binary\n",
         of(|f| f.0),
         of(|_| "4"),
@@ -41,11 +42,11 @@ fn record(p: &CloudPoint) -> [u8; 36] {
     bytes
 }
 
-/// Writes `path` under a temporary name and renames it when it is complete.
-pub fn write_pcd(path: &Path, source: &(impl PointSource + ?Sized), count: u64) -> Result<()> {
+/// Writes `path` under a temporary name and renames it when it is complete. `frame`: of the points.
+pub fn write_pcd(path: &Path, source: &(impl PointSource + ?Sized), count: u64, frame: &str) -> Result<()> {
     let file = crate::files::Aside::create(path)?;
     let mut out = BufWriter::with_capacity(1 << 20, file.file());
-    let mut written = out.write_all(header(count).as_bytes());
+    let mut written = out.write_all(header(count, frame).as_bytes());
     source.for_each_chunk(&mut |chunk| {
         for p in chunk {
             if written.is_ok() {
@@ -69,7 +70,7 @@ mod tests {
         let points: Vec<CloudPoint> = (0..5)
             .map(|i| CloudPoint { position: [i as f32, 2.5, -1.0].into(), shot: 7, v: 3.25, ..Default::default() })
             .collect();
-        write_pcd(&path, &points, 5).unwrap();
+        write_pcd(&path, &points, 5, "camera").unwrap();
         let reader = pcd_rs::DynReader::open(&path).unwrap();
         assert_eq!(reader.map(|r| r.unwrap().0.len()).collect::<Vec<_>>(), [9; 5]);
         let bytes = std::fs::read(&path).unwrap();
@@ -79,6 +80,7 @@ mod tests {
             header.contains("POINTS 5") && header.contains("FIELDS x y z intensity sigma_mm quality shot u v"),
             "{header}"
         );
+        assert!(header.contains("\n# sheetlight cloud, camera frame, mm\n"), "{header}");
         assert!(header.contains("SIZE 4 4 4 4 4 4 4 4 4\nTYPE F F F F F F U F F\n"), "{header}");
         assert_eq!(bytes.len() - end, 5 * 36);
         let third = &bytes[end + 2 * 36..];

@@ -34,7 +34,7 @@ pub fn write(
         Ok(map)
     };
     let ((map, pcd), of_cloud) = rayon::join(
-        || rayon::join(heights, || write_pcd(&out.join("cloud.pcd"), &source, points)),
+        || rayon::join(heights, || write_pcd(&out.join("cloud.pcd"), &source, points, source.frame())),
         || hash(out, "cloud.ply"),
     );
     let map = pcd.and(map)?;
@@ -49,7 +49,8 @@ pub fn of_map(
     map: &HeightMap,
 ) -> Result<(HeightMapFigures, BTreeMap<String, String>)> {
     map.save(out)?;
-    write_pcd(&out.join("cloud.pcd"), &CloudFile::open(cloud)?, points)?;
+    let source = CloudFile::open(cloud)?;
+    write_pcd(&out.join("cloud.pcd"), &source, points, source.frame())?;
     Ok((figures(map), hashes(out, hash(out, "cloud.ply")?)?))
 }
 
