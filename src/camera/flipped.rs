@@ -27,7 +27,7 @@ impl Flip {
         match self {
             Flip::Turned => "turned by 180 degrees",
             Flip::LeftRight => "mirrored left to right",
-            Flip::UpDown => "mirrored upside down",
+            Flip::UpDown => "mirrored top to bottom",
         }
     }
 }

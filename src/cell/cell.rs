@@ -12,7 +12,7 @@ use super::world::{Places, START_DEG, World};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Board, Camera, Flange, Mat3, Part, Rigid, Tool, Vec3, exp};
 use crate::raster::Image;
-use crate::simulate::{InScene, Scene, SceneSpec, Station, hot_pixels, part_pose};
+use crate::simulate::{InScene, Scene, SceneSpec, Station, part_pose};
 use rand::Rng;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -85,10 +85,9 @@ impl Cell {
         let arm = (Vs060::built(&arm_error), start(&options, &base_from_scene)?);
         let world = World::new(&options, arm, places, held, station.rng("repeatability", 0));
         let gripper = camera::gripper_station(&station, &flange_from_tool);
-        let pixels = station.camera.width as usize * station.camera.height as usize;
         Ok(Cell(Arc::new(Inside {
             clock: Clock::new(options.speed),
-            hot: hot_pixels(&station.sensor, pixels, &mut station.rng("hot", 0)),
+            hot: station.hot_pixels(),
             gripper,
             scene: Mutex::new(Arc::new(scene)),
             base_from_board: base_from_board.filter(|_| base_from_camera.is_none()),

@@ -90,6 +90,10 @@ pub struct Calibration<T> {
     /// Of a camera: how its pictures were read from the sensor, where they said so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub readout: Option<Readout>,
+    /// Of a camera and of a laser plane: pixels that shine by themselves in all pictures that were used (column, row),
+    /// px. They tell whether later pictures are read from the sensor in the same way.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub hot_pixels: Vec<[u32; 2]>,
     /// What was found.
     pub value: T,
     /// Of the value's parameters.
@@ -125,6 +129,7 @@ impl<T: Serialize> Calibration<T> {
             inputs: BTreeMap::new(),
             rests_on: with.map(|c| (Kind::Camera, c.content())).into_iter().collect(),
             readout: None,
+            hot_pixels: Vec::new(),
             value,
             covariance,
             quality,

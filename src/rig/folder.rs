@@ -182,6 +182,13 @@ impl Rig {
     pub fn need_camera(&self) -> Result<&Calibration<Intrinsics>> {
         self.camera.as_ref().ok_or_else(|| missing(Kind::Camera))
     }
+    /// The sensor's hot pixels as its calibrations know them: the laser plane's, whose pictures are dark, else the
+    /// camera's. In room light a speck of the background looks like a hot pixel to a camera that stands still.
+    pub fn hot_pixels(&self) -> &[[u32; 2]] {
+        let of = [self.laser_plane.as_ref().map(|c| &c.hot_pixels), self.camera.as_ref().map(|c| &c.hot_pixels)];
+        of.into_iter().flatten().find(|hot| !hot.is_empty()).map_or(&[], |hot| hot)
+    }
+
     /// The sheet of light; refused where it is missing or was measured with another camera.
     pub fn need_laser_plane(&self) -> Result<&Calibration<Plane<Camera>>> {
         self.belonging(&self.laser_plane)?.ok_or_else(|| missing(Kind::LaserPlane))

@@ -2,12 +2,12 @@
 //! or on this machine's processor, with the same results.
 //! Frame and unit: peaks in pixels and grey levels, points in the poses' frame, mm.
 
-use super::{Along, Ambient, Extraction, Format, HotPixels, Place, Processor, Why};
+use super::{Along, Ambient, Extraction, Format, Place, Processor, Why};
 use crate::camera::Intrinsics;
 use crate::fault::Result;
 use crate::geometry::{Camera, Plane};
 use crate::gpu::Device;
-use crate::raster::{Image, Mask};
+use crate::raster::{HotPixels, Image, Mask};
 use crate::stages::chain::batches::{Batch, Chain};
 use crate::stages::chain::config::ChainConfig;
 use crate::stages::host::Host;
@@ -251,7 +251,7 @@ impl Engine {
 
     /// Takes a picture, and where the camera stood.
     pub fn submit(&mut self, shot: u32, mut image: Image, place: Place) -> Result<()> {
-        self.hot.fill(&mut image, Along::crossed(self.optics.across()));
+        self.hot.fill(&mut image, Along::crossed(self.optics.across()).step());
         self.pending.push(Job { shot, place, image });
         let usual = match &self.way {
             Some(Way::Gpu(chain)) => chain.frame.shots as usize,

@@ -9,7 +9,6 @@ mod cloud;
 mod engine;
 mod extraction;
 mod foreign;
-mod hot;
 mod live;
 mod map;
 pub mod overlay;
@@ -29,7 +28,6 @@ pub use cloud::{CloudFile, CloudPoint, CloudWriter, PointSource, read_cloud, wri
 pub use engine::{Engine, Measured, Optical, StripeSeen};
 pub use extraction::Extraction;
 pub use foreign::{Lines, Raw, Stated, lines, read_foreign, read_foreign_page};
-pub use hot::HotPixels;
 pub use live::Live;
 pub use map::files::{MAP_FILES, MapScale};
 pub use map::filter::{Filter, MOST_FILTERS};

@@ -4,12 +4,12 @@
 //! paper's eq. 5 and 6).
 
 use super::engine::{Engine, Measured, Optical, StripeSeen};
-use super::{Along, Ambient, Carrier, CloudPoint, Extraction, HotPixels, Pictures, Place, Processor, Shot};
+use super::{Along, Ambient, Carrier, CloudPoint, Extraction, Pictures, Place, Processor, Shot};
 use crate::camera::Intrinsics;
 use crate::fault::Result;
 use crate::geometry::{Base, Camera, Plane, Rigid, Vec2, Vec3};
 use crate::gpu::Device;
-use crate::raster::Image;
+use crate::raster::{HotPixels, Image};
 use crate::rig::{Rig, Volume};
 use crate::stages::peak::Stripe;
 use crate::stages::peak::found::{Peak, SATURATED};
@@ -52,6 +52,10 @@ pub struct Scanner {
     waiting: Vec<Shot>,
     stripe: Option<Stripe>,
     hot: HotPixels,
+    /// Hot pixels of the camera's calibration; empty where its pictures are read otherwise, and said to be.
+    known_hot: HotPixels,
+    /// Of the pictures, px.
+    size: [u32; 2],
     /// What the engine is built for: the stripe, or while all was dark the assumed one.
     built: Option<Stripe>,
     support: Option<Support<Place>>,
@@ -76,7 +80,10 @@ impl Scanner {
     ) -> Result<Scanner> {
         extraction.check()?;
         let pictures: Pictures = pictures.into();
-        let camera = rig.need_camera()?.for_pictures(pictures.size(), pictures.readout.as_ref())?;
+        let calibrated = rig.need_camera()?;
+        let camera = calibrated.for_pictures(pictures.size(), pictures.readout.as_ref())?;
+        let read_alike = camera == calibrated.value;
+        let known_hot = HotPixels::stored(if read_alike { rig.hot_pixels() } else { &[] });
         let format = pictures.format;
         let laser = rig.need_laser_plane()?.value;
         let optics = Optics::new(&camera, &laser);
@@ -93,6 +100,8 @@ impl Scanner {
             waiting: Vec::new(),
             stripe: None,
             hot: HotPixels::default(),
+            known_hot,
+            size: pictures.size(),
             built: None,
             support: None,
             early: Vec::new(),
@@ -151,8 +160,14 @@ impl Scanner {
     }
 
     fn settle(&mut self, seen: StripeSeen) -> Result<()> {
+        seen.hot.otherwise(&self.known_hot, self.size).map(|otherwise| otherwise.remark()).transpose()?;
         (self.stripe, self.hot) = (Some(seen.stripe), seen.hot);
         self.release(seen.stripe)
+    }
+
+    /// What the pictures say against the camera's calibration, once their hot pixels are known.
+    pub fn remark(&self) -> Option<String> {
+        self.hot.otherwise(&self.known_hot, self.size)?.remark().ok()
     }
 
     fn assumed(&self) -> Stripe {

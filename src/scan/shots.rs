@@ -32,6 +32,14 @@ impl Along {
     pub fn crossed(Vec2 { x, y }: Vec2) -> Along {
         if y.abs() >= x.abs() { Along::U } else { Along::V }
     }
+
+    /// To the next pixel along the stripe: columns and rows, px.
+    pub fn step(self) -> [u32; 2] {
+        match self {
+            Along::U => [1, 0],
+            Along::V => [0, 1],
+        }
+    }
 }
 
 /// What the points of a cloud do not say of the shots they are from.

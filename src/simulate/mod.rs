@@ -21,7 +21,7 @@ mod write;
 pub use light::{Canvas, InScene, LitPoint, View};
 pub use options::{DEFAULT_SCENE, Set, SimulateOptions};
 pub use pattern::Pattern;
-pub use picture::{expose, hot_pixels};
+pub use picture::expose;
 pub use plan::{Views, above, base_from_scene, board_views, flange, reported, scan};
 pub use ride::Ride;
 pub use rig::RigSpec;

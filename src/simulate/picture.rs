@@ -109,7 +109,7 @@ pub fn blur(canvas: &mut Canvas, sigma: f64) {
 }
 
 /// Hot pixels of a sensor: place and extra grey as share of full scale; the same in every picture.
-pub fn hot_pixels(sensor: &Sensor, pixels: usize, rng: &mut Pcg64) -> Vec<(usize, f32)> {
+pub(super) fn hot_pixels(sensor: &Sensor, pixels: usize, rng: &mut Pcg64) -> Vec<(usize, f32)> {
     let count = (sensor.hot_per_million * pixels as f64 / 1e6).round() as usize;
     (0..count).map(|_| (rng.random_range(0..pixels), rng.random_range(0.02f32..0.5))).collect()
 }

@@ -2,6 +2,7 @@
 //! hand-eye — whose every number is known.
 //! Frame and unit: camera and flange frames, mm, rad; pixels; grey levels as shares of full scale.
 
+use super::picture::hot_pixels;
 use super::rig::RigSpec;
 use super::sensor::Sensor;
 use crate::camera::{ALWAYS_NAMED, Distortion, Intrinsics, NAMES};
@@ -142,6 +143,12 @@ impl Station {
         self.sensor.blur_px * f64::from(self.camera.width) / f64::from(self.rig.camera.width_px)
     }
 
+    /// Hot pixels of its sensor: index in rows from the top, extra grey as share of full scale.
+    pub fn hot_pixels(&self) -> Vec<(usize, f32)> {
+        let pixels = self.camera.width as usize * self.camera.height as usize;
+        hot_pixels(&self.sensor, pixels, &mut self.rng("hot", 0))
+    }
+
     /// Writes the true values as the calibration of a station folder; an independent random stream
     /// for everything that is drawn later is [`Station::rng`].
     pub fn store(&self, folder: &Path) -> Result<()> {
@@ -163,7 +170,9 @@ impl Station {
         let plane = none(&["nx", "ny", "nz", "offset_mm"]);
         let pointer = none(&["ox_mm", "oy_mm", "oz_mm", "dx", "dy", "dz"]);
         let pose = none(&["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"]);
-        let camera = Calibration::new(Kind::Camera, self.camera, None, camera, quality.clone());
+        let mut camera = Calibration::new(Kind::Camera, self.camera, None, camera, quality.clone());
+        let place = |i: usize| [i as u32 % self.camera.width, i as u32 / self.camera.width];
+        camera.hot_pixels = self.hot_pixels().iter().map(|hot| place(hot.0)).collect();
         let with = Some(&camera);
         Rig {
             laser_plane: Some(Calibration::new(Kind::LaserPlane, self.laser.plane(), with, plane, quality.clone())),

@@ -4,7 +4,7 @@
 
 use super::light::{Canvas, View};
 use super::options::{DEFAULT_SCENE, Set, SimulateOptions};
-use super::picture::{expose, hot_pixels};
+use super::picture::expose;
 use super::plan;
 use super::ride::Ride;
 use super::scene::{Scene, SceneSpec};
@@ -167,8 +167,7 @@ impl Plan {
         // A folder with a meta.json is complete: that of a former simulation goes first, the new one comes last.
         let meta = folder.join("meta.json");
         crate::files::remove(&meta).map_err(|e| Fault::write(&meta, e))?;
-        let pixels = station.camera.width as usize * station.camera.height as usize;
-        let hot = hot_pixels(&station.sensor, pixels, &mut station.rng("hot", 0));
+        let hot = station.hot_pixels();
         let visible: Vec<Vec<Vec3>> = self
             .shots
             .par_iter()

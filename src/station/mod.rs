@@ -15,6 +15,7 @@ pub mod job;
 mod judge;
 mod output;
 mod range;
+mod read_alike;
 mod robot;
 mod scan;
 mod settings;

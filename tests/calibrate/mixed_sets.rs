@@ -13,7 +13,7 @@ use sheetlight::geometry::{Vec2, Vec3};
 use sheetlight::recording::Recording;
 use std::sync::Arc;
 
-const KINDS: [&str; 5] = ["turned by 180", "mirrored left", "mirrored upside", "region", "focal length"];
+const KINDS: [&str; 5] = ["turned by 180", "mirrored left", "mirrored top", "region", "focal length"];
 
 /// A board of 9x6 corners reads a mirrored picture as another one of itself.
 fn mirrored(o: &mut Observation) {

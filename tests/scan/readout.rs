@@ -168,3 +168,94 @@ fn a_size_that_nobody_explains_is_refused_and_a_persons_word_counts() {
     let said = refused(&silent, &["--region", "400,0"]);
     assert!(said.contains("another sensor"), "{said}");
 }
+
+/// The ways to read a sensor that keep the picture's size.
+const TURNED: [(&str, fn(u32, u32) -> (u32, u32)); 4] = [
+    ("turned by 180 degrees", |x, y| (639 - x, 479 - y)),
+    ("mirrored left to right", |x, y| (639 - x, y)),
+    ("mirrored top to bottom", |x, y| (x, 479 - y)),
+    ("moved by 10 columns and -6 rows", |x, y| (x.saturating_sub(10), (y + 6).min(479))),
+];
+
+#[test]
+fn pictures_that_are_turned_against_the_calibration_are_refused() {
+    let whole = Whole::new();
+    let scan = |name: &str, images: &[Image]| {
+        let from = whole.folder(name);
+        record(&whole.folder("scan"), &from, images, None);
+        (from, whole.folder(&format!("{name} out")), whole.folder("station"))
+    };
+    for (turned, of) in TURNED {
+        let read = |i: &Image| {
+            image(640, 480, |x, y| {
+                let (x, y) = of(x, y);
+                i.get(x, y).into()
+            })
+        };
+        let (from, out, station) = scan(turned, &whole.images.iter().map(read).collect::<Vec<_>>());
+        let [from, out, station] = [&from, &out, &station].map(|p| p.to_str().unwrap());
+        let said = sheetlight_fails(&["scan", from, "--station", station, "--out", out, "--on", "cpu", "--quiet"]).1;
+        assert!(said.contains(&format!("the pictures are {turned}")) && said.contains("ReverseX"), "{said}");
+    }
+    let (from, out, station) = scan("as they are", &whole.images);
+    let [from, out, station] = [&from, &out, &station].map(|p| p.to_str().unwrap());
+    sheetlight(&["scan", from, "--station", station, "--out", out, "--on", "cpu", "--quiet"]);
+    let report = std::fs::read_to_string(Path::new(out).join("scan.json")).unwrap();
+    assert!(!report.contains("hot pixels lie"), "{report}");
+}
+
+#[test]
+fn pictures_of_another_sensor_are_remarked_on() {
+    let whole = Whole::new();
+    let remark = |rig: &Rig| {
+        let carrier = Carrier::new(rig, &Motion::default()).unwrap();
+        let format = Format::of(&whole.images[0]);
+        let mut scanner =
+            Scanner::new(rig, carrier, format, &Extraction::default(), None, None, Processor::host()).unwrap();
+        let mut source = RecordingSource::open(&Recording::open(&whole.folder("scan")).unwrap(), None, 0).unwrap();
+        while let Some(shot) = source.next() {
+            scanner.push(shot.unwrap()).unwrap();
+        }
+        scanner.finish().unwrap();
+        scanner.remark()
+    };
+    assert_eq!(remark(&whole.rig), None);
+    let mut other = whole.rig.clone();
+    let hot = &mut other.camera.as_mut().unwrap().hot_pixels;
+    assert!(hot.len() >= 4, "{hot:?}");
+    *hot = vec![[20, 400], [333, 7], [601, 250], [111, 222], [512, 90]];
+    let said = remark(&other).expect("a remark");
+    assert!(said.contains("another camera") && said.contains("0 of 5 hot pixels"), "{said}");
+    // A camera that was imported knows none: the laser plane's calibration may.
+    other.laser_plane.as_mut().unwrap().hot_pixels = std::mem::take(&mut other.camera.as_mut().unwrap().hot_pixels);
+    assert!(remark(&other).is_some());
+}
+
+#[test]
+fn calibrations_know_the_hot_pixels_of_their_sensor_and_refuse_a_turned_one() {
+    let dir = tempfile::tempdir().unwrap();
+    let sim = dir.path().join("sim");
+    let at = |name: &str| sim.join(name).to_str().unwrap().to_owned();
+    sheetlight(&["simulate", "--out", sim.to_str().unwrap(), "--set", "intrinsics,laserplane", "--quiet"]);
+    let known = Rig::load(&sim.join("station")).unwrap().camera.unwrap().hot_pixels;
+    let station = dir.path().join("station");
+    let station = station.to_str().unwrap();
+    sheetlight(&["station", "new", "--station", station, "--quiet"]);
+    sheetlight(&["calibrate", "camera", &at("intrinsics"), "--station", station, "--quiet"]);
+    let laser_plane = ["calibrate", "laser-plane", &at("laserplane"), "--station", station, "--on", "cpu", "--quiet"];
+    sheetlight(&laser_plane);
+    let rig = Rig::load(Path::new(station)).unwrap();
+    for found in [rig.camera.unwrap().hot_pixels, rig.laser_plane.unwrap().hot_pixels] {
+        assert!(found.len() >= 4 && found.iter().all(|p| known.contains(p)), "{found:?} of {known:?}");
+    }
+    for entry in std::fs::read_dir(sim.join("laserplane")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "png") {
+            let picture = sheetlight::raster::load(&path, sheetlight::raster::Channel::default(), 8).unwrap();
+            let turned = image(640, 480, |x, y| picture.get(639 - x, 479 - y).into());
+            save_png(&turned, &path).unwrap();
+        }
+    }
+    let said = sheetlight_fails(&laser_plane).1;
+    assert!(said.contains("turned by 180 degrees, compared with those of the calibration"), "{said}");
+}

@@ -13,7 +13,7 @@ use crate::calibrate::limits::Judgement;
 use crate::camera::{ALWAYS_NAMED, Intrinsics, NAMES};
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
-use crate::recording::{Recording, one_readout};
+use crate::recording::{Recording, hot_pixels, one_readout};
 use crate::rig::{Calibration, Covariance, Kind, Quality, Verdict};
 use std::collections::BTreeMap;
 
@@ -80,6 +80,7 @@ pub fn calibrate(
     inputs.retain(|name, _| name.ends_with("meta.json") || result.used.iter().any(|o| o.name == *name));
     result.calibration.inputs = inputs;
     result.calibration.readout = readout;
+    result.calibration.hot_pixels = hot_pixels(recordings).places().to_vec();
     Ok(result)
 }
 

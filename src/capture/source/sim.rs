@@ -12,7 +12,7 @@ use crate::geometry::{AxisKind, Camera, Rigid};
 use crate::raster::Image;
 use crate::recording::{Motion, Stand};
 use crate::simulate::{
-    Canvas, DEFAULT_SCENE, InScene, Ride, Scene, SceneSpec, Station, View, base_from_scene, expose, flange, hot_pixels,
+    Canvas, DEFAULT_SCENE, InScene, Ride, Scene, SceneSpec, Station, View, base_from_scene, expose, flange,
     riding_board, scan, scene_from_board,
 };
 use std::path::PathBuf;
@@ -223,8 +223,7 @@ impl SimCamera {
     pub fn open(spec: &SimSpec) -> Result<SimCamera> {
         let motion = SimMotion::new(spec)?;
         let station = &motion.station;
-        let pixels = station.camera.width as usize * station.camera.height as usize;
-        let hot = hot_pixels(&station.sensor, pixels, &mut station.rng("hot", 0));
+        let hot = station.hot_pixels();
         Ok(SimCamera { motion, spec: spec.clone(), hot, start: now_ns(), next: 0, former: (0, 0.0) })
     }
 

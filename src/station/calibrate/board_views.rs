@@ -9,6 +9,7 @@ use crate::fault::{Fault, Result};
 use crate::raster::Image;
 use crate::recording::{BoardSpec, FrameRef, Recording};
 use crate::rig::Calibration;
+use crate::station::read_alike::read_alike;
 use rayon::prelude::*;
 
 /// The board in one frame of a recording.
@@ -43,6 +44,7 @@ pub fn boards(
     let meta = &recording.meta;
     let same = camera.same_pictures(meta.image.size(), meta.image.readout.as_ref());
     same.map_err(|e| e.at(recording.folder.display()))?;
+    read_alike(recording, &camera.hot_pixels)?;
     let camera = &camera.value;
     let frames: Vec<(usize, &FrameRef, &str)> =
         meta.frames.iter().enumerate().filter_map(|(i, f)| Some((i, f, f.ambient.as_deref()?))).collect();

@@ -16,7 +16,7 @@ use crate::camera::{CameraCovariance, Intrinsics};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Plane, Vec2, Vec3};
 use crate::raster::Image;
-use crate::recording::{Beam, Recording};
+use crate::recording::{Beam, Recording, hot_pixels};
 use crate::rig::{Calibration, Kind, Rig, Volume, hash_file};
 use crate::scan::{Engine, Extraction, Format, Optical, Place, Processor, Where};
 
@@ -74,6 +74,7 @@ pub fn calibrate_laser_plane(
     quality.reasons.extend(missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))));
     let page = page(&fit, &views, &quality, (camera.value.width, camera.value.height));
     let mut calibration = Calibration::new(Kind::LaserPlane, fit.plane, Some(camera), covariance(&fit), quality);
+    calibration.hot_pixels = hot_pixels(std::slice::from_ref(recording)).places().to_vec();
     let inputs = &mut calibration.inputs;
     inputs.insert("meta.json".into(), hash_file(&recording.folder.join("meta.json"))?);
     for (s, laser) in seen.iter().zip(&names) {

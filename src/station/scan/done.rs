@@ -69,7 +69,14 @@ impl Done<'_> {
             spent: self.spent,
             settings: options.extraction.clone(),
             height_map,
-            remarks: self.rig.remarks().into_iter().chain(self.source.remarks()).chain(self.stopped).collect(),
+            remarks: self
+                .rig
+                .remarks()
+                .into_iter()
+                .chain(self.source.remarks())
+                .chain(scanner.remark())
+                .chain(self.stopped)
+                .collect(),
             files,
             imported: None,
             filtered: None,

@@ -14,7 +14,7 @@ use sheetlight::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Vec2, Vec3,
 use sheetlight::raster::Image;
 use sheetlight::rig::{Rig, Volume};
 use sheetlight::scan::{Extraction, Where};
-use sheetlight::simulate::{Canvas, InScene, Scene, View, expose, hot_pixels, reported};
+use sheetlight::simulate::{Canvas, InScene, Scene, View, expose, reported};
 use sheetlight::station::{AutoResult, AutoRun, Cell as Drives, Ended, JointRun, Light, Went, calibrate_auto};
 
 /// A robot with the sensor over one board.
@@ -84,7 +84,7 @@ impl Drives for Simulated {
             scene_from_board * self.cell.base_from_board.inverse() * self.pose * station.flange_from_camera;
         let view = View { station, scene: &self.scene, scene_from_camera };
         let (w, h) = (station.camera.width, station.camera.height);
-        let hot = hot_pixels(&station.sensor, (w * h) as usize, &mut station.rng("hot", 0));
+        let hot = station.hot_pixels();
         let mut rng = station.rng("picture", self.pictures);
         self.pictures += 1;
         let mut canvas = Canvas::new(w, h);

@@ -7,7 +7,8 @@ use crate::calibrate::joint::shots::Reported;
 use crate::camera::Readout;
 use crate::fault::{Fault, Kind, Result};
 use crate::geometry::{Base, Flange, Rigid};
-use crate::recording::{Beam, BoardSpec, Recording, one_readout};
+use crate::raster::HotPixels;
+use crate::recording::{Beam, BoardSpec, Recording, hot_pixels, one_readout};
 use crate::rig::hash_file;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -52,6 +53,8 @@ pub struct Gathered {
     pub inputs: BTreeMap<String, String>,
     /// How all pictures were read from the sensor, where all recordings say so.
     pub readout: Option<Readout>,
+    /// Pixels that shine in all pictures by themselves.
+    pub hot: HotPixels,
     /// How many places boards stood at.
     pub places: usize,
 }
@@ -110,7 +113,7 @@ pub fn gather(
             .next("record an ambient picture with each frame"));
     }
     let readout = one_readout(recordings)?;
-    let out = Gathered { inputs, readout, ..Gathered::default() };
+    let out = Gathered { inputs, readout, hot: hot_pixels(recordings), ..Gathered::default() };
     let mut gathering = Gathering { recordings, robots, places: Vec::new(), known: BTreeMap::new(), out };
     for (f, (hash, view)) in frames.iter().zip(boards(recordings, &frames, progress)?) {
         match view {

@@ -278,6 +278,7 @@ fn records(fit: &JointFit, hand_eye: Kind, quality: &Quality, gathered: &Gathere
     let mut camera = Calibration::new(Kind::Camera, fit.state.camera, None, take(Kind::Camera), quality.clone());
     camera.inputs = gathered.inputs.clone();
     camera.readout = gathered.readout;
+    camera.hot_pixels = gathered.hot.places().to_vec();
     let x = fit.state.near_from_camera;
     let mut rig = Rig::default();
     if fit.has(Part::Stripe) {

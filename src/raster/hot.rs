@@ -1,8 +1,7 @@
-//! In: a scan's first pictures. Out: pixels that shine by themselves, and pictures in which their neighbours along
-//! the stripe stand for them. Frame and unit: px; grey levels of the pictures' depth.
+//! In: several pictures of one camera. Out: pixels that shine in all of them by themselves.
+//! Frame and unit: px; grey levels of the pictures' depth.
 
-use super::Along;
-use crate::raster::{Image, Pixels};
+use super::{Image, Pixels};
 
 /// Pixels that shine in every picture and whose neighbours do not. On the flank of a wide stripe one moves the centre
 /// of two dozen lines by a tenth of a pixel, in every shot of a flat surface. In rows from the top, each from the left.
@@ -28,8 +27,7 @@ impl HotPixels {
         if pictures.len() < PICTURES {
             return HotPixels::default();
         }
-        let full = f32::from(first.full_scale());
-        let over = (SHARE * full).max(SIGMAS * noise * full / 255.0).ceil() as u32;
+        let over = over(first, noise);
         // Two pictures: where a stripe lies on it in the one it may not in the other.
         let mut found = standing_out(first, over);
         found.extend(standing_out(others[others.len() - 1], over));
@@ -37,8 +35,37 @@ impl HotPixels {
         found.dedup();
         let needed = (QUARTERS * pictures.len()).div_ceil(4);
         found.retain(|p| pictures.iter().filter(|i| stands_out(i, *p, over)).count() >= needed);
-        let most = MOST * first.pixel_count() / 1_000_000;
-        HotPixels(if found.len() > most { Vec::new() } else { found })
+        HotPixels(few_enough(found, first.pixel_count()))
+    }
+
+    /// Those of many pictures that are looked at one by one: of each picture what [`HotPixels::may_be`] gave.
+    pub fn of_all(each: &[Vec<[u32; 2]>], pixel_count: usize) -> HotPixels {
+        if each.len() < PICTURES {
+            return HotPixels::default();
+        }
+        let mut all: Vec<[u32; 2]> = each.concat();
+        all.sort_unstable_by_key(|[x, y]| (*y, *x));
+        let needed = (QUARTERS * each.len()).div_ceil(4);
+        let found = all.chunk_by(|a, b| a == b).filter(|same| same.len() >= needed).map(|same| same[0]).collect();
+        HotPixels(few_enough(found, pixel_count))
+    }
+
+    /// The pixels of one picture that stand out: hot ones, and specks of light.
+    pub fn may_be(image: &Image) -> Vec<[u32; 2]> {
+        standing_out(image, over(image, 0.0))
+    }
+
+    /// Those of a list that was stored, in any order.
+    pub fn stored(places: &[[u32; 2]]) -> HotPixels {
+        let mut places = places.to_vec();
+        places.sort_unstable_by_key(|[x, y]| (*y, *x));
+        places.dedup();
+        HotPixels(places)
+    }
+
+    /// Columns and rows, px, in rows from the top, each from the left.
+    pub fn places(&self) -> &[[u32; 2]] {
+        &self.0
     }
 
     /// How many there are.
@@ -47,17 +74,15 @@ impl HotPixels {
     }
 
     /// Puts the mean of the two neighbours along the stripe in their places; of one that is hot itself the other
-    /// one's. Pixels beyond the picture are passed over.
-    pub fn fill(&self, image: &mut Image, along: Along) {
+    /// one's. Pixels beyond the picture are passed over. `along`: the step to the next pixel of the stripe, columns
+    /// and rows, 0 or 1 each.
+    pub fn fill(&self, image: &mut Image, [dx, dy]: [u32; 2]) {
         let (w, h) = (image.width, image.height);
         for &[x, y] in &self.0 {
             if x == 0 || y == 0 || x + 1 >= w || y + 1 >= h {
                 continue;
             }
-            let beside = match along {
-                Along::U => [[x - 1, y], [x + 1, y]],
-                Along::V => [[x, y - 1], [x, y + 1]],
-            };
+            let beside = [[x - dx, y - dy], [x + dx, y + dy]];
             let good = |p: &[u32; 2]| self.0.binary_search_by_key(&(p[1], p[0]), |q| (q[1], q[0])).is_err();
             let level = |p: &[u32; 2]| u32::from(image.get(p[0], p[1]));
             let levels: Vec<u32> = beside.iter().filter(|p| good(p)).map(level).collect();
@@ -70,6 +95,17 @@ impl HotPixels {
             }
         }
     }
+}
+
+/// Grey levels by which a hot pixel stands out where dark ones scatter by `noise` levels of an 8-bit picture.
+fn over(image: &Image, noise: f32) -> u32 {
+    let full = f32::from(image.full_scale());
+    (SHARE * full).max(SIGMAS * noise * full / 255.0).ceil() as u32
+}
+
+/// None where they are too many for a sensor.
+fn few_enough(found: Vec<[u32; 2]>, pixel_count: usize) -> Vec<[u32; 2]> {
+    if found.len() > MOST * pixel_count / 1_000_000 { Vec::new() } else { found }
 }
 
 /// All pixels of a picture that stand out.
@@ -114,12 +150,12 @@ mod tests {
     use rand::{Rng, SeedableRng};
 
     /// A stripe that moves over a noisy sensor with hot pixels, one of them on its way, two beside each other.
-    fn pictures(hot: &[[u32; 2]], along: Along) -> Vec<Image> {
+    fn pictures(hot: &[[u32; 2]], along: [u32; 2]) -> Vec<Image> {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(1);
         (0..8)
             .map(|k| {
                 let level = |x: u32, y: u32| {
-                    let across = if along == Along::U { y } else { x };
+                    let across = if along == [1, 0] { y } else { x };
                     let d = f64::from(across) - 20.0 - 2.0 * f64::from(k);
                     let light = 180.0 * (-0.5 * (d / 3.0).powi(2)).exp() * rng.random_range(0.7..1.3);
                     let own = if hot.contains(&[x, y]) { 90.0 } else { 0.0 };
@@ -136,7 +172,7 @@ mod tests {
 
     #[test]
     fn pixels_that_shine_by_themselves_are_found_and_the_stripe_is_not() {
-        for along in [Along::U, Along::V] {
+        for along in [[1, 0], [0, 1]] {
             let hot = [[5, 40], [40, 5], [41, 5], [50, 28], [28, 44]];
             let seen = pictures(&hot, along);
             let all: Vec<&Image> = seen.iter().collect();
