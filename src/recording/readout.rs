@@ -1,8 +1,14 @@
-//! Who says how pictures were read from the sensor: their source, meta.json, or a person where those do not.
+//! Who says how pictures were read from the sensor: their source, meta.json, or a person where those do not; and the
+//! sensor's hot pixels, which show it.
 
 use super::Recording;
 use crate::camera::Readout;
 use crate::fault::{Fault, Result};
+use crate::raster::HotPixels;
+use rayon::prelude::*;
+
+/// Pictures that are looked at, evenly taken: more would find the same pixels.
+const MOST: usize = 24;
 
 /// How pictures were read from the sensor: by their source, or by a person where that does not say.
 ///
@@ -36,6 +42,24 @@ pub fn one_readout(recordings: &[Recording]) -> Result<Option<Readout>> {
     Ok(recordings.iter().all(|r| r.meta.image.readout.is_some()).then_some(readout))
 }
 
+/// The hot pixels of the camera that took these recordings: of the pictures with the laser, where room light hides
+/// fewer of them, else of all. Pictures that cannot be read are passed over.
+pub fn hot_pixels(recordings: &[Recording]) -> HotPixels {
+    let frames = || recordings.iter().flat_map(|r| r.meta.frames.iter().map(move |f| (r, f)));
+    let mut pictures: Vec<(&Recording, &String)> = frames().filter_map(|(r, f)| Some((r, f.laser.as_ref()?))).collect();
+    if pictures.len() < MOST {
+        pictures.extend(frames().filter_map(|(r, f)| Some((r, f.ambient.as_ref()?))));
+    }
+    let step = pictures.len().div_ceil(MOST).max(1);
+    let chosen: Vec<_> = pictures.into_iter().step_by(step).collect();
+    let looked_at = chosen.par_iter().filter_map(|(recording, name)| {
+        let image = recording.picture(name).ok()?;
+        Some((HotPixels::may_be(&image), image.pixel_count()))
+    });
+    let (each, counts): (Vec<_>, Vec<_>) = looked_at.unzip();
+    HotPixels::of_all(&each, counts.first().copied().unwrap_or(0))
+}
+
 impl Recording {
     /// Takes a person's word for how its pictures were read from the sensor.
     ///
@@ -44,5 +68,21 @@ impl Recording {
     pub fn read_out_as(&mut self, word: Option<Readout>) -> Result<()> {
         self.meta.image.readout = stated_once(self.meta.image.readout, word)?;
         Ok(())
+    }
+
+    /// Compares its hot pixels with those that calibrations know.
+    ///
+    /// # Errors
+    /// Pictures that are turned, mirrored or moved against those of the calibration. Nothing is said where either side
+    /// shows too few hot pixels.
+    pub fn read_alike(&self, known: &[[u32; 2]]) -> Result<()> {
+        if known.is_empty() {
+            return Ok(());
+        }
+        let here = hot_pixels(std::slice::from_ref(self));
+        match here.otherwise(&HotPixels::stored(known), self.meta.image.size()) {
+            Some(otherwise) => otherwise.remark().map(drop).map_err(|e| e.at(self.folder.display())),
+            None => Ok(()),
+        }
     }
 }

@@ -24,7 +24,8 @@ const FIELDS: [(&str, &str); 9] = [
 fn header(count: u64, frame: &str) -> String {
     let of = |what: fn(&(&'static str, &'static str)) -> &'static str| FIELDS.each_ref().map(what).join(" ");
     format!(
-        "# .PCD v.7 - Point Cloud Data file format\n# sheetlight cloud, {frame} frame, mm\nVERSION .7\nFIELDS {}\nSIZE {}\nTYPE {}\nCOUNT {}\n\
+        "# .PCD v.7 - Point Cloud Data file format\n# sheetlight cloud, {frame} frame, mm\n\
+         VERSION .7\nFIELDS {}\nSIZE {}\nTYPE {}\nCOUNT {}\n\
          WIDTH {count}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\nDATA binary\n",
         of(|f| f.0),
         of(|_| "4"),

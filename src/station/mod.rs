@@ -15,7 +15,6 @@ pub mod job;
 mod judge;
 mod output;
 mod range;
-mod read_alike;
 mod robot;
 mod scan;
 mod settings;

@@ -3,7 +3,6 @@
 //! Frame and unit: camera and base frame; mm, rad.
 
 use super::calibrate::hand_eye::first_line;
-use super::read_alike::read_alike;
 use crate::calibrate::hand_eye::report::HAND_EYE_NAMES;
 use crate::calibrate::pointer::range::{
     BasePoint, RIG, Ranged, RobotNoise, SharedCovariance, Surface, joint_covariance, range, surface, to_base,
@@ -172,7 +171,7 @@ pub(super) fn touched(recording: &Recording, rig: &Rig, run: &RangeRun) -> Resul
     let image = &recording.meta.image;
     let same = camera.same_pictures(image.size(), image.readout.as_ref());
     same.map_err(|e| e.at(recording.folder.display()))?;
-    read_alike(recording, rig.hot_pixels())?;
+    recording.read_alike(rig.hot_pixels())?;
     let joint = joint_covariance(&pointer.covariance);
     let carried = Carried::of(recording, rig, run)?;
     let mut remarks = rig.remarks();

@@ -9,7 +9,6 @@ use crate::fault::{Fault, Result};
 use crate::raster::Image;
 use crate::recording::{BoardSpec, FrameRef, Recording};
 use crate::rig::Calibration;
-use crate::station::read_alike::read_alike;
 use rayon::prelude::*;
 
 /// The board in one frame of a recording.
@@ -44,7 +43,7 @@ pub fn boards(
     let meta = &recording.meta;
     let same = camera.same_pictures(meta.image.size(), meta.image.readout.as_ref());
     same.map_err(|e| e.at(recording.folder.display()))?;
-    read_alike(recording, &camera.hot_pixels)?;
+    recording.read_alike(&camera.hot_pixels)?;
     let camera = &camera.value;
     let frames: Vec<(usize, &FrameRef, &str)> =
         meta.frames.iter().enumerate().filter_map(|(i, f)| Some((i, f, f.ambient.as_deref()?))).collect();
