@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 
@@ -30,8 +31,8 @@ def bag(by_program, made, tmp_path_factory):
     """The file that the program makes of its scan, with everything in it."""
     folder = tmp_path_factory.mktemp("mcap")
     part = folder / "part.json"
-    numbers = ", ".join(str(x) for x in PART.ravel())
-    part.write_text('{"recipe": "plate", "frame": "base", "passed": true, "reasons": [], "base_from_part": [%s]}' % numbers)
+    found = {"recipe": "plate", "frame": "base", "passed": True, "reasons": [], "base_from_part": PART.ravel().tolist()}
+    part.write_text(json.dumps(found))
     out = folder / "scan.mcap"
     arguments = ["mcap", by_program, "--recording", made.recording().folder, "--station", made.station.folder]
     arguments += ["--pictures", "--part", part, "--out", out]

@@ -1,6 +1,5 @@
 //! In: a finished scan, and where given its recording, its station and the parts found in it. Out: `scan.mcap`, whole
 //! or not there.
-//! not there.
 //! Frame and unit: the cloud's frame, which messages name; mm become metres here.
 
 use super::bag::{Bag, Topic};
