@@ -26,8 +26,8 @@
 //! the next step.
 //!
 //! **Features.** `cli` (default) is the command line with clap and indicatif and all else, `bench` what it measures,
-//! `gige` cameras that speak GigE Vision, `cell` the simulated cell, `web` the operator's screen; a program that uses
-//! the library takes what it wants: `default-features = false`.
+//! `gige` cameras that speak GigE Vision, `cell` the simulated cell, `ros` scans as MCAP files with ROS 2 messages,
+//! `web` the operator's screen; a program that uses the library takes what it wants: `default-features = false`.
 //!
 //! The modules stand in floor order; each imports only from floors above it in this list (ARCHITECTURE.md, enforced by
 //! tests/floors.rs).
@@ -65,6 +65,8 @@ pub mod bench;
 pub mod find;
 pub mod station;
 
+#[cfg(feature = "ros")]
+pub mod ros;
 #[cfg(feature = "web")]
 pub mod web;
 

@@ -50,6 +50,7 @@ const MAY: &[(&str, &[&str])] = &[
             "find",
         ],
     ),
+    ("ros", &["geometry", "raster", "camera", "robot", "recording", "rig", "capture", "scan", "station"]),
     (
         "web",
         &[
@@ -94,6 +95,7 @@ const MAY: &[(&str, &[&str])] = &[
             "bench",
             "find",
             "station",
+            "ros",
             "web",
         ],
     ),
@@ -115,6 +117,7 @@ const HOMES: &[(&str, &str)] = &[
     ("image", "raster"),
     ("indicatif", "cli"),
     ("libm", "calibrate"),
+    ("mcap", "ros"),
     ("mimalloc", "main"),
     ("multiversion", "stages"),
     ("notify", "capture"),

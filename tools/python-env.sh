@@ -7,8 +7,8 @@ set -eu
 folder=$1 set=$2
 case $set in
   test) packages="numpy scipy libigl maturin==1.* mypy pytest" ;;
-  files) packages="laspy[lazrs] matplotlib opencv-contrib-python-headless==4.14.* pyarrow pye57 pypcd4 tifffile"
-    packages="$packages trimesh xarray" ;;
+  files) packages="laspy[lazrs] matplotlib mcap mcap-ros2-support opencv-contrib-python-headless==4.14.* pyarrow pye57"
+    packages="$packages pypcd4 rosbags tifffile trimesh xarray" ;;
   peers) packages="numpy scipy numba opencv-contrib-python-headless==4.14.*" ;;
   *) echo "python-env.sh: unknown set '$set': test, files or peers" >&2; exit 2 ;;
 esac

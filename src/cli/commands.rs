@@ -7,7 +7,7 @@ use super::find::{batch, filter, ghost, import_map, locate as find, matching, mo
 use super::insert::{guide, job, robot, sweep};
 use super::terminal::console::Console;
 use super::terminal::threads;
-use super::{bench, board, calibrate, cell, demo, live, range, rig, scan, shift_scan, simulate, station, verify};
+use super::{bench, board, calibrate, cell, demo, live, range, rig, ros, scan, shift_scan, simulate, station, verify};
 use crate::fault::Result;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
@@ -36,7 +36,7 @@ struct Cli {
 const GROUPS: [(&str, &[&str]); 6] = [
     ("Station", &["rig", "station", "verify", "doctor"]),
     ("Calibration", &["board", "calibrate"]),
-    ("Scan", &["camera", "record", "live", "scan", "shift-scan", "filter", "range", "batch"]),
+    ("Scan", &["camera", "record", "live", "scan", "shift-scan", "filter", "range", "batch", "mcap"]),
     ("Find", &["teach", "model", "find", "second-look", "ghost", "match", "import-map"]),
     ("Robot", &["sweep", "job", "guide", "program", "robot"]),
     ("Simulation and measurement", &["demo", "simulate", "cell", "bench"]),
@@ -82,6 +82,7 @@ enum Command {
     Job(job::Args),
     Live(live::Args),
     Match(matching::Args),
+    Mcap(ros::Args),
     Model(model::Args),
     Program(program::Args),
     Range(range::Args),
@@ -123,6 +124,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Job(a) => job::run(a, console),
         Command::Live(a) => live::run(a, console),
         Command::Match(a) => matching::run(a, console),
+        Command::Mcap(a) => ros::run(a, console),
         Command::Model(a) => model::run(a, console),
         Command::Program(a) => program::run(a, console),
         Command::Range(a) => range::run(a, console),

@@ -15,6 +15,7 @@ mod insertion;
 mod live;
 mod range;
 mod rig;
+mod ros;
 mod scan;
 mod shift_scan;
 mod simulate;

@@ -126,11 +126,7 @@ pub fn find_part(
     options: &LocateOptions,
 ) -> Result<(Report, RgbImage)> {
     let scanned = load_report(scan)?;
-    let rig = station.map(Rig::load).transpose()?.map(|rig| parts_for(&rig, &scanned.motion));
-    if let (Some(rig), Some(station)) = (&rig, station) {
-        rig.belong_together().map_err(|e| e.at(station.display()))?;
-        fits(rig, scan, &scanned)?;
-    }
+    let rig = station.map(|station| rig_that_scanned(station, scan, &scanned)).transpose()?;
     let (cloud, shots) = (lit_cloud_of(scan)?, shots_of(scan)?);
     let report = located(&cloud, &shots, &scanned, recipe, rig.as_ref(), options).map_err(|e| e.at(scan.display()))?;
     let image = picture::draw(&report, &recipe.drawing());
@@ -179,6 +175,17 @@ fn located(
     }
     report.notes.extend_from_slice(&scanned.remarks);
     Ok(report)
+}
+
+/// The parts of a station's rig that a finished scan rests on; `scanned` is the report of the folder `scan`.
+///
+/// # Errors
+/// Calibrations that do not belong together, or are not those that the scan was made with.
+pub fn rig_that_scanned(station: &Path, scan: &Path, scanned: &ScanReport) -> Result<Rig> {
+    let rig = parts_for(&Rig::load(station)?, &scanned.motion);
+    rig.belong_together().map_err(|e| e.at(station.display()))?;
+    fits(&rig, scan, scanned)?;
+    Ok(rig)
 }
 
 /// Refuses a scan that was made with other calibrations than the station's present ones.

@@ -44,7 +44,10 @@ pub use calibrate::mount::{Mounted, mount_of};
 pub use calibrate::pointer::{PointerRun, calibrate_pointer};
 pub use edit::{changed, edited, point_added, point_chosen, point_taken_out};
 pub use filter::{filter_map, filter_scan, left};
-pub use find::{Looked, SecondLook, find_part, find_part_held, find_part_in_all, second_look, teach_held, teach_part};
+pub use find::{
+    Looked, SecondLook, find_part, find_part_held, find_part_in_all, rig_that_scanned, second_look, teach_held,
+    teach_part,
+};
 pub use ghost::{Lies, ghost};
 pub use guide::{GuideOptions, Guided, Step, guide};
 pub use import_map::import_map;
@@ -62,7 +65,7 @@ pub use scan::options::ScanOptions;
 pub use scan::progress::Checkpoint;
 pub use scan::recorded::scan_recording;
 pub use scan::report::{
-    Filtered, HeightMapFigures, Imported, ScanReport, Spent, cloud_of, lit_cloud_of, load_report, shots_of,
+    Filtered, HeightMapFigures, Imported, ScanReport, Spent, cloud_of, lit_cloud_of, load_report, shots_of, whole_scan,
 };
 pub use scan::run::{scan, scan_on};
 pub use scan::scan_folder::of_a_scan;

@@ -9,10 +9,11 @@ use std::path::Path;
 use std::process::Command;
 
 /// Documents whose commands run one after the other in one folder, as a reader would type them.
-const FOLDERS: [&[&str]; 3] = [
+const FOLDERS: [&[&str]; 4] = [
     &["docs/getting-started.md", "docs/calibration.md", "docs/scanning.md", "docs/finding-and-inserting.md"],
     &["docs/hardware.md"],
     &["README.md"],
+    &["docs/connections.md"],
 ];
 
 /// Blocks that cannot run in a test, by document. The numbers may only fall.
@@ -186,6 +187,11 @@ fn the_hardware_guide_shows_what_its_commands_print() {
 #[test]
 fn the_front_page_shows_what_its_commands_print() {
     agree(FOLDERS[2]);
+}
+
+#[test]
+fn the_page_of_connections_shows_what_its_commands_print() {
+    agree(FOLDERS[3]);
 }
 
 #[test]

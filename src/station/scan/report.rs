@@ -265,6 +265,25 @@ pub fn lit_cloud_of(scan: &Path) -> Result<Vec<CloudPoint>> {
 
 /// The points of a finished scan, checked to be those that the scan wrote.
 pub fn cloud_of(scan: &Path) -> Result<Vec<CloudPoint>> {
+    let (report, _) = opened(scan)?;
+    report.check_files(scan)?;
+    read_cloud(&scan.join("cloud.ply"))
+}
+
+/// A finished scan with its points on the disk, all of it checked to be what the scan wrote: report, shots, cloud.
+///
+/// # Errors
+/// As [`cloud_of`] and [`shots_of`]: a scan without points, files that are missing, cut off, or of another scan.
+pub fn whole_scan(scan: &Path) -> Result<(ScanReport, Shots, CloudFile)> {
+    let (report, cloud) = opened(scan)?;
+    let shots = shots_of(scan)?;
+    report.check_files(scan)?;
+    Ok((report, shots, cloud))
+}
+
+/// A scan that has points, and its cloud, whose header and length alone were looked at: what is not a cloud is not
+/// worth hashing.
+fn opened(scan: &Path) -> Result<(ScanReport, CloudFile)> {
     settle(scan)?;
     if !scan.join("cloud.ply").exists() {
         let recording = scan.join("meta.json").exists();
@@ -275,8 +294,6 @@ pub fn cloud_of(scan: &Path) -> Result<Vec<CloudPoint>> {
     }
     let report = load_report(scan)?;
     report.has_points().map_err(|e| e.at(scan.display()))?;
-    // Its header and length first: what is no cloud is not worth hashing.
-    CloudFile::open(&scan.join("cloud.ply"))?;
-    report.check_files(scan)?;
-    read_cloud(&scan.join("cloud.ply"))
+    let cloud = CloudFile::open(&scan.join("cloud.ply"))?;
+    Ok((report, cloud))
 }

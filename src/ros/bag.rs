@@ -1,0 +1,163 @@
+//! In: messages with topic and time. Out: an MCAP file of profile ros2 that holds them, with its index.
+//! Frame and unit: none.
+
+use super::cdr::Cdr;
+use super::definitions::Kind;
+use super::messages::Stamp;
+use crate::fault::{Fault, Result};
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{McapError, WriteOptions, Writer};
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::fs::File;
+use std::io::{BufWriter, ErrorKind};
+use std::path::{Path, PathBuf};
+
+/// What messages are about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Topic {
+    /// A shot's points.
+    Profile,
+    /// All points.
+    Cloud,
+    /// Where frames were at a shot.
+    Transforms,
+    /// Where frames always are.
+    Static,
+    /// A shot's picture.
+    Picture,
+    /// Its camera.
+    CameraInfo,
+    /// A part that was found.
+    Part,
+    /// The scan's figures.
+    Diagnostics,
+}
+
+impl Topic {
+    /// As subscribers name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Topic::Profile => "/sheetlight/profile",
+            Topic::Cloud => "/sheetlight/cloud",
+            Topic::Transforms => "/tf",
+            Topic::Static => "/tf_static",
+            Topic::Picture => "/sheetlight/picture",
+            Topic::CameraInfo => "/sheetlight/camera_info",
+            Topic::Part => "/sheetlight/part",
+            Topic::Diagnostics => "/diagnostics",
+        }
+    }
+
+    /// Of its messages.
+    pub fn kind(self) -> Kind {
+        match self {
+            Topic::Profile | Topic::Cloud => Kind::PointCloud,
+            Topic::Transforms | Topic::Static => Kind::Transforms,
+            Topic::Picture => Kind::Image,
+            Topic::CameraInfo => Kind::CameraInfo,
+            Topic::Part => Kind::Pose,
+            Topic::Diagnostics => Kind::Diagnostics,
+        }
+    }
+
+    /// What a player of bags offers to subscribers, by the numbers of ROS 2's middleware: everything is kept in order
+    /// (reliable), and what is said once reaches those that come later (durability 1, transient local).
+    fn quality_of_service(self) -> String {
+        let (depth, durability) = match self {
+            Topic::Static | Topic::Cloud | Topic::Part | Topic::Diagnostics => (1, 1),
+            _ => (100, 2),
+        };
+        let never = "{sec: 0, nsec: 0}";
+        format!(
+            "- history: 1\n  depth: {depth}\n  reliability: 1\n  durability: {durability}\n  deadline: {never}\n  \
+             lifespan: {never}\n  liveliness: 1\n  liveliness_lease_duration: {never}\n  \
+             avoid_ros_namespace_conventions: false\n"
+        )
+    }
+}
+
+/// Bytes of messages after which a chunk is closed: what a reader takes in at a time.
+const CHUNK: u64 = 4 << 20;
+
+/// A topic in the file.
+struct Channel {
+    id: u16,
+    messages: u32,
+}
+
+/// The file while it is written. Its messages go to the disk as they come; chunks are not compressed.
+pub struct Bag<'a> {
+    path: PathBuf,
+    writer: Writer<BufWriter<&'a File>>,
+    channels: BTreeMap<Topic, Channel>,
+}
+
+impl<'a> Bag<'a> {
+    /// Begins a file; `path` is what errors call it.
+    ///
+    /// # Errors
+    /// It cannot be written, which is what every other function here fails by.
+    pub fn new(file: &'a File, path: &Path) -> Result<Bag<'a>> {
+        let options = WriteOptions::new()
+            .compression(None)
+            .profile("ros2")
+            .library(format!("sheetlight {}", env!("CARGO_PKG_VERSION")))
+            .chunk_size(Some(CHUNK));
+        let writer = options.create(BufWriter::with_capacity(1 << 20, file)).map_err(|e| fault(path, e))?;
+        Ok(Bag { path: path.to_owned(), writer, channels: BTreeMap::new() })
+    }
+
+    /// Adds a record of texts.
+    pub fn metadata(&mut self, name: &str, texts: BTreeMap<String, String>) -> Result<()> {
+        let record = Metadata { name: name.to_owned(), metadata: texts };
+        self.writer.write_metadata(&record).map_err(|e| fault(&self.path, e))
+    }
+
+    fn channel(&mut self, topic: Topic) -> std::result::Result<&mut Channel, McapError> {
+        if !self.channels.contains_key(&topic) {
+            let kind = topic.kind();
+            let schema = self.writer.add_schema(kind.name(), "ros2msg", kind.definition().as_bytes())?;
+            let told = BTreeMap::from([("offered_qos_profiles".to_owned(), topic.quality_of_service())]);
+            let id = self.writer.add_channel(schema, topic.name(), "cdr", &told)?;
+            self.channels.insert(topic, Channel { id, messages: 0 });
+        }
+        Ok(self.channels.get_mut(&topic).expect("just added"))
+    }
+
+    /// Adds a message; its time is that of the log too.
+    pub fn write(&mut self, topic: Topic, at: Stamp, message: &Cdr) -> Result<()> {
+        let path = self.path.clone();
+        let channel = self.channel(topic).map_err(|e| fault(&path, e))?;
+        let header =
+            MessageHeader { channel_id: channel.id, sequence: channel.messages, log_time: at.0, publish_time: at.0 };
+        channel.messages += 1;
+        self.writer.write_to_known_channel(&header, message.bytes()).map_err(|e| fault(&path, e))
+    }
+
+    /// Writes the index. Returns the number of messages by topic.
+    pub fn finish(mut self) -> Result<BTreeMap<Topic, u32>> {
+        self.writer.finish().map_err(|e| fault(&self.path, e))?;
+        let counts = self.channels.iter().map(|(topic, c)| (*topic, c.messages)).collect();
+        self.writer.into_inner().into_inner().map_err(|e| Fault::write(&self.path, e.into_error()))?;
+        Ok(counts)
+    }
+}
+
+/// What the disk said is the cause, however deep it is wrapped.
+fn fault(path: &Path, error: McapError) -> Fault {
+    let McapError::Io(error) = error else {
+        return Fault::output(format!("{}: cannot be written: {error}", path.display()))
+            .cause("a fault of this program")
+            .next("report it with the scan's scan.json");
+    };
+    let mut inner: Option<&(dyn Error + 'static)> = Some(&error);
+    while let Some(e) = inner {
+        if e.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == ErrorKind::StorageFull) {
+            return Fault::write(path, ErrorKind::StorageFull.into());
+        }
+        let held = e.downcast_ref::<std::io::Error>().and_then(|e| e.get_ref());
+        inner = held.map(|e| e as &(dyn Error + 'static)).or_else(|| e.source());
+    }
+    Fault::write(path, error)
+}

@@ -1,0 +1,19 @@
+//! In: a finished scan, and where given its recording, its station and the parts found in it. Out: an MCAP file with
+//! messages of ROS 2, made without ROS.
+//! Frame and unit: frames of docs/connections.md; metres in the file.
+
+mod bag;
+mod cdr;
+mod clock;
+mod definitions;
+mod export;
+mod figures;
+mod frames;
+mod messages;
+mod part;
+mod recorded;
+
+pub use clock::Source;
+pub use export::{Export, Exported, Written, export};
+pub use frames::{FRAMES, Frames, Renamed};
+pub use messages::MOST_POINTS;
