@@ -94,7 +94,8 @@ impl Reader<'_> {
         self.workgroup(entry, cases);
         let mut named: Vec<&str> = module.overrides.iter().filter_map(|(_, o)| o.name.as_deref()).collect();
         let mut told: Vec<&str> = stage.overrides.iter().map(String::as_str).collect();
-        (named.sort_unstable(), told.sort_unstable());
+        named.sort_unstable();
+        told.sort_unstable();
         if named != told {
             self.say(format!("override constants are {named:?} in WGSL, {told:?} in Rust"), "correct Stage::overrides");
         }
@@ -142,11 +143,11 @@ impl Reader<'_> {
             match process_overrides(self.module, self.info, main, &values) {
                 Err(e) => self.say(format!("case '{}': {e}", case.name), "correct the case's override constants"),
                 Ok((module, _)) => {
-                    let seen = module.entry_points.iter().find(|e| e.name == entry.name).map(|e| e.workgroup_size);
-                    if seen != Some(told) {
-                        let what =
-                            format!("case '{}': @workgroup_size is {seen:?} in WGSL, {told:?} in Rust", case.name);
-                        self.say(what, next);
+                    let Some(seen) = module.entry_points.iter().find(|e| e.name == entry.name) else { continue };
+                    let seen = seen.workgroup_size;
+                    if seen != told {
+                        let place = format!("case '{}'", case.name);
+                        self.say(format!("{place}: @workgroup_size is {seen:?} in WGSL, {told:?} in Rust"), next);
                     }
                 }
             }

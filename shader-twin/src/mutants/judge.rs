@@ -68,6 +68,8 @@ fn program(stage: &Stage, wgsl: &str, cases: &[(&Case, &[Words])]) -> std::resul
             constant.init = None;
         }
     }
+    // Named constants would be kept, used or not.
+    module.constants.iter_mut().for_each(|(_, constant)| constant.name = None);
     compact(&mut module, KeepUnused::No);
     Ok(format!("{module:?}"))
 }
@@ -143,5 +145,32 @@ impl Run<'_> {
                 _ => Err(e),
             },
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Binding, Shape, Tolerance, Wanted};
+
+    /// Without an adapter the integration tests fail or skip, and say so; here only the way back is at stake.
+    #[test]
+    fn after_a_mutant_that_does_not_end_in_time_a_new_device_goes_on() {
+        let Ok(device) = Device::open(&Wanted::from_env().unwrap()) else { return };
+        let text = "@group(0) @binding(0) var<storage, read_write> words: array<u32>;
+            @compute @workgroup_size(1) fn main() { words[0] = 64u; }";
+        let words = Binding::read_write("words", Shape::array::<u32>(), Tolerance::exact("whole numbers"));
+        let stage = Stage::new("s", text, "main", [1, 1, 1], vec![words]);
+        let (case, twin) = (Case::new("c", [64, 1, 1]).with(&[0u32]), [Words::of(&[64u32])]);
+        let (stage, cases) = (&stage, vec![(&case, &twin[..])]);
+        let mut run = Run { device: &device, renewed: None, stage, cases, time_limit: Duration::from_millis(1) };
+        // Every turn needs the one before: at least 20 ms on the fastest GPU.
+        let turn = "for (var i = 0u; i < 3000000u; i++) { words[0] = (words[0] ^ (i << 5u)) * 747796405u; }";
+        let slow = text.replace("words[0] = 64u;", turn);
+        assert!(matches!(run.outcome(&slow), Ok(Outcome::TimedOut)));
+        run.time_limit = Duration::from_secs(60);
+        assert!(run.renewed.is_some() && matches!(run.outcome("no WGSL"), Ok(Outcome::Refused)));
+        assert!(matches!(run.outcome(text), Ok(Outcome::Survived)));
+        assert!(matches!(run.outcome(&text.replace("64u", "65u")), Ok(Outcome::Noticed)));
     }
 }

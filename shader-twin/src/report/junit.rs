@@ -1,7 +1,7 @@
 //! In: a report. Out: JUnit XML as build servers read it: suites of tests with failures, errors and skipped ones.
 
 use super::{Outcome, Report};
-use crate::compare::CaseResult;
+use crate::error::{Error, Kind};
 use crate::mutants::{Mutant, Mutants};
 use std::fmt::Write;
 
@@ -30,21 +30,25 @@ fn failed_if(bad: bool, why: String) -> Verdict {
 }
 
 fn tests(outcome: &Outcome) -> Vec<Test> {
-    let mut all = Vec::new();
-    let why = outcome.errors.iter().map(|e| e.to_string()).collect::<Vec<_>>().join("\n");
-    let stopped = if outcome.comparison.is_some() { "run" } else { "contract" };
-    let verdict = if why.is_empty() { Verdict::Passed } else { Verdict::Error(why) };
-    all.push(test(stopped, verdict, ""));
+    // What stopped a run belongs to the step that it stopped.
+    let declared = |e: &&Error| outcome.comparison.is_none() && matches!(e.kind(), Kind::Contract | Kind::Usage);
+    let (contract, device): (Vec<&Error>, Vec<&Error>) = outcome.errors.iter().partition(declared);
+    let error = |list: &[&Error]| {
+        let lines: Vec<String> = list.iter().map(|e| e.to_string()).collect();
+        if list.is_empty() { Verdict::Passed } else { Verdict::Error(lines.join("\n")) }
+    };
+    let mut all = vec![test("contract", error(&contract), "")];
+    if outcome.comparison.is_none() && !device.is_empty() {
+        all.push(test("cases", error(&device), ""));
+    }
     for case in outcome.comparison.iter().flat_map(|c| &c.cases) {
-        all.push(test(format!("case: {}", case.name), failed_if(!case.passed(), CaseResult::line(case)), case.line()));
+        all.push(test(format!("case: {}", case.name), failed_if(!case.passed(), case.line()), case.line()));
     }
-    match &outcome.mutants {
-        Some(mutants) => {
-            let failed = failed_if(!mutants.passed(), told(mutants));
-            all.push(test("mutants", failed, mutants.line()));
-        }
-        None => all.push(test("mutants", Verdict::Skipped("the shader did not pass its cases".into()), "")),
-    }
+    all.push(match &outcome.mutants {
+        Some(mutants) => test("mutants", failed_if(!mutants.passed(), told(mutants)), mutants.line()),
+        None if outcome.comparison.is_some() && !device.is_empty() => test("mutants", error(&device), ""),
+        None => test("mutants", Verdict::Skipped("the shader did not pass its cases".into()), ""),
+    });
     all
 }
 
