@@ -73,17 +73,26 @@ fn cases() -> Vec<Case> {
     ]
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let folder = std::env::args().nth(1).unwrap_or_else(|| "target/shader-twin".into());
+fn pair() -> Pair {
     let turn = "for (var step = 1u; step < 64u; step <<= 1u) {";
-    let pair = Pair::new(stage(), twin, cases())
-        .explain(turn, &turn.replace("< 64", "<= 64"), "no invocation is 64 places behind the block's begin")
-        .explain(turn, &turn.replace("64u", "65u"), "no invocation is 64 places behind the block's begin")
-        .explain(turn, &turn.replace("64u", "63u"), "steps are powers of two: 32 is the last one either way");
-    let device = Device::open(&Wanted::from_env()?)?;
-    let mut report = Report::new("Prefix sum", &device);
-    report.add(pair.run(&device));
-    report.write(Path::new(&folder))?;
+    let far = "no invocation is 64 places behind the block's begin";
+    Pair::new(stage(), twin, cases())
+        .explain(turn, &turn.replace("< 64", "<= 64"), far)
+        .explain(turn, &turn.replace("64u", "65u"), far)
+        .explain(turn, &turn.replace("64u", "63u"), "steps are powers of two: 32 is the last one either way")
+}
+
+/// Runs everything on a device and writes the report into a folder.
+pub fn run(device: &Device, folder: &Path) -> Result<Report, shader_twin::Error> {
+    let mut report = Report::new("Prefix sum", device);
+    report.add(pair().run(device));
+    report.write(folder)?;
+    Ok(report)
+}
+
+pub fn main() -> Result<(), Box<dyn Error>> {
+    let folder = std::env::args().nth(1).unwrap_or_else(|| "target/shader-twin".into());
+    let report = run(&Device::open(&Wanted::from_env()?)?, Path::new(&folder))?;
     println!("{report}");
     if report.passed() { Ok(()) } else { Err("the prefix sum did not pass".into()) }
 }

@@ -1,4 +1,6 @@
-//! Tests of compute shaders written in WGSL, on software Vulkan and on real GPUs.
+#![doc = include_str!("../README.md")]
+//!
+//! # The parts
 //!
 //! A [`Stage`] is the text of a shader together with what the Rust side believes of it: entry point, workgroup size,
 //! bindings, layouts, overrides. A [`Pair`] adds the CPU twin, which is the same arithmetic in Rust, and named
@@ -11,26 +13,6 @@
 //!    a mutant that they do not notice is listed with its line and column.
 //!
 //! A [`Report`] holds the outcomes and writes them as JUnit XML and as Markdown.
-//!
-//! ```no_run
-//! use shader_twin::{Binding, Case, Device, Pair, Shape, Stage, Tolerance, Wanted};
-//!
-//! let text = "@group(0) @binding(0) var<storage, read_write> words: array<u32>;
-//!     @compute @workgroup_size(64)
-//!     fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-//!         if id.x < arrayLength(&words) { words[id.x] = words[id.x] * 3u; }
-//!     }";
-//! let words = Binding::read_write("words", Shape::array::<u32>(), Tolerance::exact("whole numbers"));
-//! let pair = Pair::new(
-//!     Stage::new("triple", text, "main", [64, 1, 1], vec![words]),
-//!     |bindings, _| bindings[0].get_mut::<u32>().iter_mut().for_each(|word| *word *= 3),
-//!     vec![Case::new("a hundred", [2, 1, 1]).with(&(0..100).collect::<Vec<u32>>())],
-//! );
-//! let device = Device::open(&Wanted::from_env()?)?;
-//! let outcome = pair.run(&device);
-//! assert!(outcome.passed(), "{outcome}");
-//! # Ok::<(), shader_twin::Error>(())
-//! ```
 //!
 //! Units: sizes and offsets are bytes, times are seconds, lines and columns count from 1, columns in characters.
 #![forbid(unsafe_code)]

@@ -78,6 +78,8 @@ fn a_declaration_that_agrees_gives_nothing() {
     assert_eq!(found(stage(), case()), [""; 0]);
 }
 
+type Change = Box<dyn Fn(&mut Stage)>;
+
 /// What is changed in the declaration, and what is said.
 #[test]
 fn every_disagreement_is_named() {
@@ -90,7 +92,7 @@ fn every_disagreement_is_named() {
         move |s: &mut Stage| s.bindings[3].shape = Shape::Tail(head.clone(), name, peak())
     };
     let wide = Layout { name: "Wide", bytes: 16, fields: vec![Field { name: "length", offset: 0, bytes: 4 }] };
-    let changes: Vec<(Box<dyn Fn(&mut Stage)>, &str)> = vec![
+    let changes: Vec<(Change, &str)> = vec![
         (
             Box::new(|s| s.entry = "other".into()),
             "there is no entry point 'other'; the shader has [\"main\", \"shade\"]",

@@ -6,8 +6,10 @@ use quick_xml::Reader;
 use quick_xml::events::Event;
 use shader_twin::{Binding, Case, Device, Pair, Report, Shape, Stage, Tolerance, Words};
 
+type Element = (String, Vec<(String, String)>);
+
 /// Elements by name with their attributes, as the reader unescapes them, and all text.
-fn read(xml: &str) -> (Vec<(String, Vec<(String, String)>)>, String) {
+fn read(xml: &str) -> (Vec<Element>, String) {
     let mut reader = Reader::from_str(xml);
     reader.config_mut().check_end_names = true;
     let (mut elements, mut text) = (Vec::new(), String::new());
@@ -30,7 +32,7 @@ fn read(xml: &str) -> (Vec<(String, Vec<(String, String)>)>, String) {
     (elements, text)
 }
 
-fn attribute<'a>(element: &'a (String, Vec<(String, String)>), key: &str) -> &'a str {
+fn attribute<'a>(element: &'a Element, key: &str) -> &'a str {
     element.1.iter().find(|(k, _)| k == key).map_or("", |(_, value)| value)
 }
 
@@ -66,9 +68,8 @@ fn junit_counts_what_ran() {
     let Some(device) = common::device() else { return };
     let (elements, text) = read(&report(&device).junit());
     let suites: Vec<_> = elements.iter().filter(|e| e.0 == "testsuite").collect();
-    let counts = |e: &(String, Vec<(String, String)>)| {
-        ["name", "tests", "failures", "errors", "skipped"].map(|key| attribute(e, key).to_owned())
-    };
+    let counts =
+        |e: &Element| ["name", "tests", "failures", "errors", "skipped"].map(|key| attribute(e, key).to_owned());
     assert_eq!(counts(suites[0]), ["right", "4", "0", "0", "0"]);
     assert_eq!(counts(suites[1]), ["differs", "4", "1", "0", "1"]);
     assert_eq!(counts(suites[2]), ["contract", "2", "0", "1", "1"]);
