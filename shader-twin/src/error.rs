@@ -24,7 +24,7 @@ pub enum Kind {
 }
 
 /// A refusal: what happened, the likely cause, the next step.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub struct Error {
     kind: Kind,
     what: String,
@@ -74,4 +74,24 @@ impl fmt::Display for Error {
     }
 }
 
+/// As [`fmt::Display`]: `unwrap` and a `main` that returns an error show it, and a person reads it there.
+impl fmt::Debug for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
 impl std::error::Error for Error {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_says_what_why_and_what_next() {
+        let error = Error::new(Kind::Refused, "2 of 1").cause("too many").next("take one");
+        assert_eq!(error.to_string(), "2 of 1; likely cause: too many; next: take one");
+        assert_eq!(format!("{error:?}"), error.to_string());
+        assert_eq!(Error::new(Kind::Refused, "2 of 1").to_string(), "2 of 1");
+    }
+}

@@ -28,7 +28,8 @@ fn counted(starts: &[u32]) -> Pair {
         let word = &mut bindings[0].get_mut::<u32>()[0];
         *word = (0..*word).sum();
     };
-    let cases = starts.iter().map(|n| Case::new(&format!("from {n}"), [1, 1, 1]).with(&[*n])).collect();
+    // A second word, because a mutant beyond the end of a buffer is noticed by some adapters only.
+    let cases = starts.iter().map(|n| Case::new(&format!("from {n}"), [1, 1, 1]).with(&[*n, 99])).collect();
     Pair::new(Stage::new("counted", COUNTED, "main", [1, 1, 1], words()), twin, cases)
 }
 
