@@ -1,5 +1,6 @@
 //! In: what the device and the twin made of a case. Out: the word in which they are furthest apart.
 
+use crate::case::Case;
 use crate::device::Adapter;
 use crate::stage::{Access, Binding, Stage};
 use crate::words::Words;
@@ -19,7 +20,7 @@ pub struct Worst {
     pub limit: f64,
     /// The unit of both.
     pub unit: &'static str,
-    /// Words of the case that are beyond their limit.
+    /// Words of the case that are beyond their limit; 1 where the stage's own rule refuses the case.
     pub words_beyond: usize,
 }
 
@@ -68,8 +69,48 @@ impl Comparison {
     }
 }
 
-/// Compares the words of all writable bindings.
-pub(crate) fn compared(stage: &Stage, name: &str, device: &[Words], twin: &[Words]) -> CaseResult {
+/// The distance of what the device and what the twin made of a case: the device's content of all bindings comes first.
+pub(crate) type Apart = dyn Fn(&Case, &[Words], &[Words]) -> f64;
+
+/// A caller's own rule for a stage.
+pub(crate) struct Rule {
+    pub apart: Box<Apart>,
+    pub limit: f64,
+}
+
+/// Compares a case by the stage's own rule, or else the words of all writable bindings by their tolerances.
+pub(crate) fn compared(
+    stage: &Stage,
+    rule: Option<&Rule>,
+    case: &Case,
+    device: &[Words],
+    twin: &[Words],
+) -> CaseResult {
+    match rule {
+        None => word_by_word(stage, &case.name, device, twin),
+        Some(rule) => by_rule(stage, rule, case, device, twin),
+    }
+}
+
+fn by_rule(stage: &Stage, rule: &Rule, case: &Case, device: &[Words], twin: &[Words]) -> CaseResult {
+    let (distance, limit) = ((rule.apart)(case, device, twin), rule.limit);
+    let written = stage.bindings.iter().zip(twin).filter(|(b, _)| b.access == Access::ReadWrite);
+    let words = written.map(|(_, words)| words.raw().len()).sum();
+    // Not a number is beyond every limit.
+    let within = distance <= limit;
+    let worst = (distance != 0.0).then(|| Worst {
+        place: "the stage's own rule".into(),
+        device: "all bindings".into(),
+        twin: "all bindings".into(),
+        distance,
+        limit,
+        unit: "the rule's own",
+        words_beyond: usize::from(!within),
+    });
+    CaseResult { name: case.name.clone(), words, worst }
+}
+
+fn word_by_word(stage: &Stage, name: &str, device: &[Words], twin: &[Words]) -> CaseResult {
     let mut result = CaseResult { name: name.into(), words: 0, worst: None };
     // Distance over limit, which makes rules of different units comparable.
     let (mut worst_share, mut beyond) = (0.0, 0);
@@ -148,7 +189,7 @@ mod tests {
     fn result(index: u32, level: f32, padding: u32) -> CaseResult {
         let device = [Found { index: 0, level: 0.0, padding: 0 }, Found { index, level, padding }];
         let twin = [Found { index: 0, level: 0.0, padding: 0 }, Found { index: 7, level: 1.0, padding: 0 }];
-        compared(&stage(), "case", &[Words::zeros(1), Words::of(&device)], &[Words::zeros(1), Words::of(&twin)])
+        word_by_word(&stage(), "case", &[Words::zeros(1), Words::of(&device)], &[Words::zeros(1), Words::of(&twin)])
     }
 
     #[test]
@@ -168,6 +209,19 @@ mod tests {
         let worst = both.worst.as_ref().unwrap();
         assert_eq!((worst.place.as_str(), worst.words_beyond), ("found[1].index", 2));
         assert!(both.line().contains("device 0x00000008 (8"), "{}", both.line());
+    }
+
+    #[test]
+    fn a_rule_of_the_caller_replaces_the_tolerances() {
+        let (case, stage) = (Case::new("c", [1; 3]), stage());
+        let judge = |distance: f64| {
+            let apart = Box::new(move |_: &Case, a: &[Words], b: &[Words]| if a == b { distance } else { -9.0 });
+            let words = [Words::zeros(1), Words::zeros(6)];
+            compared(&stage, Some(&Rule { apart, limit: 2.0 }), &case, &words, &words)
+        };
+        assert_eq!((judge(0.0).worst, judge(0.0).words), (None, 6));
+        assert!(judge(2.0).passed() && !judge(2.5).passed() && !judge(f64::NAN).passed());
+        assert_eq!(judge(2.5).worst.unwrap().limit, 2.0);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! In: a stage, its CPU twin and its cases. Out: whether they agree, and whether the cases notice a changed shader.
 
 use crate::case::Case;
-use crate::compare::{Comparison, compared};
+use crate::compare::{Comparison, Rule, compared};
 use crate::contract::disagreements;
 use crate::device::Device;
 use crate::error::{Error, Kind, Result};
@@ -22,6 +22,7 @@ pub struct Pair {
     cases: Vec<Case>,
     explained: Vec<Explained>,
     time_limit: Duration,
+    rule: Option<(Rule, String)>,
 }
 
 impl Pair {
@@ -31,12 +32,26 @@ impl Pair {
     /// The twin is given the content of all bindings, in the stage's order, and the case; it changes the content as
     /// the dispatch does. It panics where the content is not what it expects ([`Words::get`]).
     pub fn new(stage: Stage, twin: impl Fn(&mut [Words], &Case) + 'static, cases: Vec<Case>) -> Pair {
-        Pair { stage, twin: Box::new(twin), cases, explained: Vec::new(), time_limit: Self::TIME_LIMIT }
+        Pair { stage, twin: Box::new(twin), cases, explained: Vec::new(), time_limit: Self::TIME_LIMIT, rule: None }
     }
 
     /// Sets the longest time that one case may take on the device; a mutant that takes longer counts as noticed.
     pub fn time_limit(mut self, limit: Duration) -> Pair {
         self.time_limit = limit;
+        self
+    }
+
+    /// Judges a case as a whole, in place of the bindings' tolerances: for lists in an order that is left to the
+    /// device, for results that only together have a meaning. The rule is given the case and the content of all
+    /// bindings, the device's first; its distance may be at most `limit`. It must not panic, whatever the device wrote:
+    /// a mutant may have written anything.
+    pub fn judged_by(
+        mut self,
+        rule: impl Fn(&Case, &[Words], &[Words]) -> f64 + 'static,
+        limit: f64,
+        reason: &str,
+    ) -> Pair {
+        self.rule = Some((Rule { apart: Box::new(rule), limit }, reason.into()));
         self
     }
 
@@ -52,6 +67,9 @@ impl Pair {
     /// device.
     pub fn check(&self) -> Vec<Error> {
         let mut found = disagreements(&self.stage, &self.cases);
+        if self.rule.as_ref().is_some_and(|(_, reason)| reason.trim().is_empty()) {
+            found.push(Error::new(Kind::Contract, format!("{}: the stage's own rule has no reason", self.stage.name)));
+        }
         if self.cases.is_empty() {
             found.push(Error::new(Kind::Usage, format!("{}: 0 cases, at least 1 is needed", self.stage.name)));
         }
@@ -87,7 +105,7 @@ impl Pair {
         let mut compiled = Vec::new();
         for (case, twin) in self.cases.iter().zip(&expected) {
             let out = run_case(device, &self.stage, &self.stage.wgsl, case, &mut compiled, self.time_limit)?;
-            cases.push(compared(&self.stage, &case.name, &out, twin));
+            cases.push(compared(&self.stage, self.rule.as_ref().map(|r| &r.0), case, &out, twin));
         }
         Ok(Comparison { adapter: device.adapter().clone(), cases })
     }
@@ -103,7 +121,13 @@ impl Pair {
         self.agreed()?;
         let expected = self.expected()?;
         let cases: Vec<(&Case, &[Words])> = self.cases.iter().zip(expected.iter().map(Vec::as_slice)).collect();
-        crate::mutants::judged(device, &self.stage, &cases, &self.explained, self.time_limit)
+        let trial = crate::mutants::Trial {
+            stage: &self.stage,
+            rule: self.rule.as_ref().map(|r| &r.0),
+            cases,
+            time_limit: self.time_limit,
+        };
+        crate::mutants::judged(device, trial, &self.explained)
     }
 
     /// All three: [`Pair::check`], [`Pair::compare`], and [`Pair::mutate`] where the comparison passed.

@@ -114,3 +114,35 @@ fn a_twin_that_changes_what_the_shader_only_reads_is_refused() {
     let refused = Pair::new(Stage::new("s", text, "main", [1, 1, 1], bindings), twin, vec![case]).compare(&device);
     assert_eq!(refused.unwrap_err().what(), "s: the twin changes 'given', which the shader only reads");
 }
+
+/// Invocations take places in the order in which they come: only the set of numbers is the same.
+#[test]
+fn a_list_in_any_order_is_judged_by_a_rule() {
+    let Some(device) = common::device() else { return };
+    let text = "@group(0) @binding(0) var<storage, read_write> count: atomic<u32>;
+        @group(0) @binding(1) var<storage, read_write> list: array<u32>;
+        @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+            if id.x % 3u == 1u { list[atomicAdd(&count, 1u)] = id.x; }
+        }";
+    // Last number first, which no device is likely to do.
+    let twin = |b: &mut [Words], _: &Case| {
+        let numbers: Vec<u32> = (0..256).rev().filter(|i| i % 3 == 1).collect();
+        b[0].get_mut::<u32>()[0] = numbers.len() as u32;
+        b[1].get_mut::<u32>()[..numbers.len()].copy_from_slice(&numbers);
+    };
+    let sorted = |b: &[Words]| {
+        let mut list = b[1].get::<u32>().to_vec();
+        list.sort_unstable();
+        (b[0].get::<u32>()[0], list)
+    };
+    let rule = move |_: &Case, device: &[Words], twin: &[Words]| f64::from(u8::from(sorted(device) != sorted(twin)));
+    let bindings = || vec![Binding::read_write("count", Shape::One(Layout::of::<u32>()), exact()), words("list")];
+    let stage = || Stage::new("thirds", text, "main", [64, 1, 1], bindings());
+    let cases = || vec![Case::new("c", [4, 1, 1]).zeros(1).zeros(100)];
+    let any_order = Pair::new(stage(), twin, cases()).judged_by(rule, 0.0, "the order of invocations is not defined");
+    let outcome = any_order.run(&device);
+    assert!(outcome.passed() && outcome.mutants.as_ref().unwrap().killed >= 8, "{outcome}");
+    assert!(!Pair::new(stage(), twin, cases()).compare(&device).unwrap().passed());
+    let silent = Pair::new(stage(), twin, cases()).judged_by(rule, 0.0, "").check();
+    assert_eq!(silent[0].what(), "thirds: the stage's own rule has no reason");
+}

@@ -4,7 +4,7 @@ use super::changes::changes;
 use super::loops::{bounded, has_loops};
 use super::{Explained, Mutant, Mutants};
 use crate::case::Case;
-use crate::compare::compared;
+use crate::compare::{Rule, compared};
 use crate::contract::parsed;
 use crate::device::Device;
 use crate::error::{Error, Kind, Result};
@@ -22,20 +22,25 @@ const FIRST_TURNS: u32 = 64;
 /// The last bound: four times more still fits the counter.
 const MOST_TURNS: u32 = 1 << 28;
 
-/// Runs all mutants of a stage. Each case comes with the words that the twin made of it.
-pub(crate) fn judged(
-    device: &Device,
-    stage: &Stage,
-    cases: &[(&Case, &[Words])],
-    explained: &[Explained],
-    time_limit: Duration,
-) -> Result<Mutants> {
-    let mut run = Run { device, renewed: None, stage, cases: cases.to_vec(), time_limit };
+/// How a shader's text is tried.
+pub(crate) struct Trial<'a> {
+    pub stage: &'a Stage,
+    pub rule: Option<&'a Rule>,
+    /// Each comes with the words that the twin made of it.
+    pub cases: Vec<(&'a Case, &'a [Words])>,
+    pub time_limit: Duration,
+}
+
+/// Runs all mutants of a stage.
+pub(crate) fn judged(device: &Device, trial: Trial, explained: &[Explained]) -> Result<Mutants> {
+    let stage = trial.stage;
+    let cases = trial.cases.clone();
+    let mut run = Run { device, renewed: None, trial };
     let mut found = Mutants { turns: run.turns()?, ..Mutants::default() };
-    let mut seen = HashSet::from([program(stage, &stage.wgsl, cases).map_err(|e| run.usage(e))?]);
+    let mut seen = HashSet::from([program(stage, &stage.wgsl, &cases).map_err(|e| run.usage(e))?]);
     for change in changes(&stage.wgsl) {
         let text = change.apply(&stage.wgsl);
-        let Ok(tree) = program(stage, &text, cases) else {
+        let Ok(tree) = program(stage, &text, &cases) else {
             found.refused += 1;
             continue;
         };
@@ -74,6 +79,7 @@ fn program(stage: &Stage, wgsl: &str, cases: &[(&Case, &[Words])]) -> std::resul
     Ok(format!("{module:?}"))
 }
 
+#[derive(Debug)]
 enum Outcome {
     Noticed,
     TimedOut,
@@ -85,24 +91,22 @@ struct Run<'a> {
     device: &'a Device,
     /// Opened in place of the first one, once that gave no answer.
     renewed: Option<Device>,
-    stage: &'a Stage,
     /// The case that noticed the last mutant comes first.
-    cases: Vec<(&'a Case, &'a [Words])>,
-    time_limit: Duration,
+    trial: Trial<'a>,
 }
 
 impl Run<'_> {
     fn usage(&self, what: String) -> Error {
-        Error::new(Kind::Usage, format!("{}: {what}", self.stage.name))
+        Error::new(Kind::Usage, format!("{}: {what}", self.trial.stage.name))
     }
 
     /// The position of the first case that differs from the twin.
     fn differs(&self, wgsl: &str) -> Result<Option<usize>> {
         let device = self.renewed.as_ref().unwrap_or(self.device);
         let mut pipelines = Vec::new();
-        for (i, (case, twin)) in self.cases.iter().enumerate() {
-            let out = run_case(device, self.stage, wgsl, case, &mut pipelines, self.time_limit)?;
-            if !compared(self.stage, &case.name, &out, twin).passed() {
+        for (i, (case, twin)) in self.trial.cases.iter().enumerate() {
+            let out = run_case(device, self.trial.stage, wgsl, case, &mut pipelines, self.trial.time_limit)?;
+            if !compared(self.trial.stage, self.trial.rule, case, &out, twin).passed() {
                 return Ok(Some(i));
             }
         }
@@ -111,15 +115,15 @@ impl Run<'_> {
 
     /// How many turns a mutant may take: found by raising the bound until the shader itself passes.
     fn turns(&mut self) -> Result<u32> {
-        if let Some(i) = self.differs(&self.stage.wgsl)? {
-            let what = format!("the shader itself differs from its twin in case '{}'", self.cases[i].0.name);
+        if let Some(i) = self.differs(&self.trial.stage.wgsl)? {
+            let what = format!("the shader itself differs from its twin in case '{}'", self.trial.cases[i].0.name);
             return Err(self.usage(what).next("run Pair::compare, and correct the shader or the twin first"));
         }
-        if !has_loops(&self.stage.wgsl) {
+        if !has_loops(&self.trial.stage.wgsl) {
             return Ok(0);
         }
         let mut turns = FIRST_TURNS;
-        while self.differs(&bounded(&self.stage.wgsl, turns))?.is_some() {
+        while self.differs(&bounded(&self.trial.stage.wgsl, turns))?.is_some() {
             if turns >= MOST_TURNS {
                 let what = format!("one invocation takes more than {MOST_TURNS} turns in its loops");
                 return Err(self.usage(what).next("make the cases smaller"));
@@ -133,7 +137,7 @@ impl Run<'_> {
         match self.differs(wgsl) {
             Ok(None) => Ok(Outcome::Survived),
             Ok(Some(i)) => {
-                self.cases[..=i].rotate_right(1);
+                self.trial.cases[..=i].rotate_right(1);
                 Ok(Outcome::Noticed)
             }
             Err(e) => match e.kind() {
@@ -160,14 +164,16 @@ mod tests {
             @compute @workgroup_size(1) fn main() { words[0] = 64u; }";
         let words = Binding::read_write("words", Shape::array::<u32>(), Tolerance::exact("whole numbers"));
         let stage = Stage::new("s", text, "main", [1, 1, 1], vec![words]);
-        let (case, twin) = (Case::new("c", [64, 1, 1]).with(&[0u32]), [Words::of(&[64u32])]);
+        let (case, twin) = (Case::new("c", [1024, 1, 1]).with(&[0u32]), [Words::of(&[64u32])]);
         let (stage, cases) = (&stage, vec![(&case, &twin[..])]);
-        let mut run = Run { device: &device, renewed: None, stage, cases, time_limit: Duration::from_millis(1) };
+        let trial = Trial { stage, rule: None, cases, time_limit: Duration::from_millis(1) };
+        let mut run = Run { device: &device, renewed: None, trial };
         // Every turn needs the one before: at least 20 ms on the fastest GPU.
         let turn = "for (var i = 0u; i < 3000000u; i++) { words[0] = (words[0] ^ (i << 5u)) * 747796405u; }";
         let slow = text.replace("words[0] = 64u;", turn);
-        assert!(matches!(run.outcome(&slow), Ok(Outcome::TimedOut)));
-        run.time_limit = Duration::from_secs(60);
+        let ended = run.outcome(&slow);
+        assert!(matches!(ended, Ok(Outcome::TimedOut)), "{ended:?}");
+        run.trial.time_limit = Duration::from_secs(60);
         assert!(run.renewed.is_some() && matches!(run.outcome("no WGSL"), Ok(Outcome::Refused)));
         assert!(matches!(run.outcome(text), Ok(Outcome::Survived)));
         assert!(matches!(run.outcome(&text.replace("64u", "65u")), Ok(Outcome::Noticed)));

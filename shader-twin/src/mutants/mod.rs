@@ -6,7 +6,7 @@ mod loops;
 mod templates;
 mod tokens;
 
-pub(crate) use judge::judged;
+pub(crate) use judge::{Trial, judged};
 
 /// A change that the cases did not notice.
 #[derive(Clone, Debug, PartialEq, Eq)]

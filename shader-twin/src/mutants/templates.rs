@@ -84,6 +84,7 @@ mod tests {
             ("a <= b, c >= d", "a <= b, c >= d"),
             ("vec2<f32>(1.0) != vec2<f32>(2.0)", "vec2{f32}(1.0) != vec2{f32}(2.0)"),
             ("array<u32,4>=x", "array{u32,4}=x"),
+            ("a < b = c > d", "a < b = c > d"),
         ] {
             assert_eq!(shown(text), expected);
         }
