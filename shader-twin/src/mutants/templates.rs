@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn lists_are_told_from_comparisons_and_shifts() {
+    fn lists_are_distinguished_from_comparisons_and_shifts() {
         for (text, expected) in [
             ("var<storage, read_write> x: array<vec4<f32>>", "var{storage, read_write} x: array{vec4{f32}}"),
             ("array<u32, (a > b)>", "array{u32, (a > b)}"),
