@@ -22,7 +22,8 @@ build:
 	$(CARGO) build --release --locked
 
 test: vulkan python cameras browser lint
-	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(CARGO) test --locked -- --show-output
+	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(if $(SHEETLIGHT_REQUIRE_GPU),,SHADER_TWIN_ALLOW_SKIP=1) \
+		$(CARGO) test --locked --package sheetlight --package shader-twin -- --show-output
 
 # A toolchain without clippy says so and goes on.
 # The pages of the screen: format and types.
@@ -31,12 +32,12 @@ pages:
 
 lint: pages
 	if $(CARGO) clippy --version >/dev/null 2>&1; then \
-		$(CARGO) clippy --locked --all-targets -- -D warnings; \
+		$(CARGO) clippy --locked --package sheetlight --package shader-twin --all-targets -- -D warnings; \
 	else echo "clippy is not installed: skipped"; fi
 	$(CARGO) check --locked --package outside
 	if $(CARGO) clippy --version >/dev/null 2>&1; then \
 		$(CARGO) clippy --locked --package sheetlight-python --features whole -- -D warnings; fi
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --package sheetlight --package shader-twin
 
 bench: vulkan build
 	$(TARGET)/release/sheetlight bench
