@@ -108,12 +108,6 @@ pub fn blur(canvas: &mut Canvas, sigma: f64) {
     }
 }
 
-/// Hot pixels of a sensor: place and extra grey as share of full scale; the same in every picture.
-pub(super) fn hot_pixels(sensor: &Sensor, pixels: usize, rng: &mut Pcg64) -> Vec<(usize, f32)> {
-    let count = (sensor.hot_per_million * pixels as f64 / 1e6).round() as usize;
-    (0..count).map(|_| (rng.random_range(0..pixels), rng.random_range(0.02f32..0.5))).collect()
-}
-
 /// A speckle contrast below this changes no level of 16 bits, and the Gamma distribution's shape leaves what f32 holds.
 const FAINTEST_SPECKLE: f64 = 1e-6;
 

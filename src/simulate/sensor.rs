@@ -2,6 +2,8 @@
 //! Frame and unit: grey levels of the sensor's depth; each field says.
 
 use crate::fault::{Fault, Result};
+use rand::Rng;
+use rand_pcg::Pcg64;
 
 /// What turns light into grey levels.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -48,6 +50,12 @@ impl Default for Sensor {
 }
 
 impl Sensor {
+    /// Hot pixels among this number of pixels: place and extra grey as share of full scale; the same in every picture.
+    pub fn hot_pixels(&self, pixels: usize, rng: &mut Pcg64) -> Vec<(usize, f32)> {
+        let count = (self.hot_per_million * pixels as f64 / 1e6).round() as usize;
+        (0..count).map(|_| (rng.random_range(0..pixels), rng.random_range(0.02f32..0.5))).collect()
+    }
+
     /// The same sensor when it is exposed `times` as long as its levels are stated for.
     #[must_use]
     pub fn exposed(self, times: f64) -> Sensor {

@@ -2,7 +2,6 @@
 //! hand-eye — whose every number is known.
 //! Frame and unit: camera and flange frames, mm, rad; pixels; grey levels as shares of full scale.
 
-use super::picture::hot_pixels;
 use super::rig::RigSpec;
 use super::sensor::Sensor;
 use crate::camera::{ALWAYS_NAMED, Distortion, Intrinsics, NAMES};
@@ -146,7 +145,7 @@ impl Station {
     /// Hot pixels of its sensor: index in rows from the top, extra grey as share of full scale.
     pub fn hot_pixels(&self) -> Vec<(usize, f32)> {
         let pixels = self.camera.width as usize * self.camera.height as usize;
-        hot_pixels(&self.sensor, pixels, &mut self.rng("hot", 0))
+        self.sensor.hot_pixels(pixels, &mut self.rng("hot", 0))
     }
 
     /// Writes the true values as the calibration of a station folder; an independent random stream
