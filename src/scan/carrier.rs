@@ -61,6 +61,7 @@ pub fn parts_for(rig: &Rig, motion: &Motion) -> Rig {
         base_camera: rig.base_camera.clone().filter(|_| robot(Carries::Part)),
         linear_axis: rig.linear_axis.clone().filter(|_| motion.axis() == Some(AxisKind::Linear)),
         turntable: rig.turntable.clone().filter(|_| motion.axis() == Some(AxisKind::Turntable)),
+        pointer: None,
         ..rig.clone()
     }
 }

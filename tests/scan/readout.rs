@@ -197,6 +197,11 @@ fn pictures_that_are_turned_against_the_calibration_are_refused() {
         let said = sheetlight_fails(&["scan", from, "--station", station, "--out", out, "--on", "cpu", "--quiet"]).1;
         assert!(said.contains(&format!("the pictures are {turned}")) && said.contains("ReverseX"), "{said}");
     }
+    // A pointer of another station: a scan does not use it.
+    let other = whole.folder("other");
+    sheetlight(&["simulate", "--out", other.to_str().unwrap(), "--seed", "2", "--shots", "2", "--quiet"]);
+    let pointer = "station/calibration/pointer.json";
+    std::fs::copy(other.join(pointer), whole.folder(pointer)).unwrap();
     let (from, out, station) = scan("as they are", &whole.images);
     let [from, out, station] = [&from, &out, &station].map(|p| p.to_str().unwrap());
     sheetlight(&["scan", from, "--station", station, "--out", out, "--on", "cpu", "--quiet"]);
