@@ -16,7 +16,9 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 /// Data goes to stdout, messages to stderr. Exit code 0: done; 1: failed or refused; 2: wrong use.
 #[derive(Parser)]
 #[command(name = "sheetlight", version, max_term_width = 100, disable_help_flag = true)]
-#[command(after_help = "First look: sheetlight demo. Own rig: docs/getting-started.md. More: sheetlight help COMMAND")]
+#[command(
+    after_help = "A first look: sheetlight demo. Your own rig: docs/getting-started.md. More: sheetlight help COMMAND"
+)]
 struct Cli {
     /// Print the result as JSON on stdout
     #[arg(long, global = true, display_order = 900)]

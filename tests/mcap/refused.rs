@@ -8,7 +8,8 @@ use std::path::Path;
 /// Runs the export and expects a refusal with these words; nothing new may lie in the file's folder.
 fn refused(code: i32, scan: &Path, out: &Path, options: &[&str], words: &[&str]) {
     let before = out.parent().and_then(|f| Some(std::fs::read_dir(f).ok()?.count()));
-    let call = [&["mcap", &text(scan), "--out", &text(out)], options].concat();
+    let (scan, file) = (text(scan), text(out));
+    let call = [&["mcap", &scan, "--out", &file], options].concat();
     let (exit, said) = common::sheetlight_fails(&call);
     assert_eq!(exit, code, "{said}");
     for word in words.iter().chain(&["error: ", "likely cause: ", "next step: "]) {
