@@ -10,7 +10,7 @@ use naga::{AddressSpace, ArraySize, GlobalVariable, Handle, Module, StorageAcces
 use shader_twin::{Binding, Device, Field, Layout, Pair, Shape, Stage, Tolerance, Wanted, Words};
 use sheetlight::stages::{self, Entry};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Changes of each shader that no case notices on Mesa's software adapter. Many compute the same: the remainder of a
 /// workgroup does nothing, a bound is never reached. The numbers may only fall. Another adapter treats what lies beyond
@@ -97,7 +97,8 @@ fn pair(entry: Entry) -> Pair {
         let [device, twin] = [device, twin].map(|words| own_words(&case, words));
         catch_unwind(AssertUnwindSafe(|| same.difference(&device, &twin))).unwrap_or(f64::INFINITY)
     };
-    Pair::new(stage, twin, given).judged_by(rule, same.limit(), same.reason())
+    // A machine at work compiles a large shader for many seconds; only a loop without end takes minutes.
+    Pair::new(stage, twin, given).judged_by(rule, same.limit(), same.reason()).time_limit(Duration::from_secs(120))
 }
 
 /// What the kit binds: stages bind multiples of 16 bytes, and a struct has its own size.
