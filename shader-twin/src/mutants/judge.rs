@@ -161,15 +161,16 @@ mod tests {
             @compute @workgroup_size(1) fn main() { words[0] = 64u; }";
         let words = Binding::read_write("words", Shape::array::<u32>(), Tolerance::exact("whole numbers"));
         let stage = Stage::new("s", text, "main", [1, 1, 1], vec![words]);
-        let (case, twin) = (Case::new("c", [1024, 1, 1]).with(&[0u32]), [Words::of(&[64u32])]);
+        let (case, twin) = (Case::new("c", [64, 1, 1]).with(&[0u32]), [Words::of(&[64u32])]);
         let (stage, cases) = (&stage, vec![(&case, &twin[..])]);
         let trial = Trial { stage, rule: None, cases, time_limit: Duration::from_millis(1) };
         let mut run = Run { device: &device, trial };
         // Every turn needs the one before: at least 20 ms on the fastest GPU.
         let turn = "for (var i = 0u; i < 3000000u; i++) { words[0] = (words[0] ^ (i << 5u)) * 747796405u; }";
         let slow = text.replace("words[0] = 64u;", turn);
-        let ended = run.outcome(&slow);
-        assert!(matches!(ended, Ok(Outcome::TimedOut)), "{ended:?}");
+        // A busy machine may wake this thread only after the end. More work would be no way out: SwiftShader's next
+        // device waits for it.
+        assert!((0..5).any(|_| matches!(run.outcome(&slow), Ok(Outcome::TimedOut))));
         run.trial.time_limit = Duration::from_secs(60);
         assert!(matches!(run.outcome("no WGSL"), Ok(Outcome::Refused)));
         assert!(matches!(run.outcome(text), Ok(Outcome::Survived)));
