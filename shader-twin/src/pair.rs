@@ -100,6 +100,7 @@ impl Pair {
     /// error: [`Comparison::passed`] tells.
     pub fn compare(&self, device: &Device) -> Result<Comparison> {
         self.agreed()?;
+        device.revive()?;
         let expected = self.expected()?;
         let mut cases = Vec::new();
         let mut compiled = Vec::new();
@@ -119,6 +120,7 @@ impl Pair {
     /// change.
     pub fn mutate(&self, device: &Device) -> Result<Mutants> {
         self.agreed()?;
+        device.revive()?;
         let expected = self.expected()?;
         let cases: Vec<(&Case, &[Words])> = self.cases.iter().zip(expected.iter().map(Vec::as_slice)).collect();
         let trial = crate::mutants::Trial {

@@ -121,8 +121,8 @@ fn changes_that_give_the_same_program_are_no_mutants() {
     assert_eq!((mutants.killed, mutants.same_program), (3, 2 + 2 + 7), "{mutants:#?}");
 }
 
-/// Work that no counter of turns bounds: the time limit ends the wait, and the device is not used again. The
-/// dispatch itself ends soon after.
+/// Work that no counter of turns bounds: the time limit ends the wait. The device is given up, and the next
+/// run has a new one.
 #[test]
 fn a_device_that_does_not_answer_in_time_is_given_up() {
     let Some(device) = common::device() else { return };
@@ -133,13 +133,14 @@ fn a_device_that_does_not_answer_in_time_is_given_up() {
             words[0] = x;
         }";
     // At least 20 ms on the fastest GPU: every turn needs the one before.
-    let case = Case::new("many turns", [1024, 1, 1]).with(&[1u32, 3_000_000]);
+    let case = Case::new("many turns", [64, 1, 1]).with(&[1u32, 3_000_000]);
     let stage = Stage::new("slow", text, "main", [1, 1, 1], words());
     let twin = |b: &mut [Words], _: &Case| b[0].get_mut::<u32>()[0] += 1;
     let pair = Pair::new(stage, twin, vec![case]).time_limit(Duration::from_millis(1));
-    let refused = pair.compare(&device).unwrap_err();
+    // A busy machine may wake this thread only after the end.
+    let refused = (0..5).find_map(|_| pair.compare(&device).err()).expect("a run that does not end in 1 ms");
     assert_eq!(refused.kind(), Kind::TimedOut);
     assert!(refused.what().contains("no end within 0.001 s"), "{refused}");
-    // The same device is not used again.
-    assert_eq!(pair.compare(&device).unwrap_err().kind(), Kind::Lost);
+    // The next run opens it anew, whoever makes it.
+    assert!(explained(counted(&[7])).run(&device).passed());
 }

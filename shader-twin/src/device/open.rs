@@ -6,15 +6,22 @@ use crate::case::Case;
 use crate::error::{Error, Kind, Result};
 use crate::stage::{Binding, Stage};
 use crate::{Shape, Tolerance};
+use std::cell::RefCell;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// An opened adapter of this machine.
+/// An opened adapter of this machine. One thread at a time uses it: a run that does not end would otherwise take the
+/// device from the runs of other threads.
 pub struct Device {
-    pub(super) raw: wgpu::Device,
-    pub(super) queue: wgpu::Queue,
     adapter: Adapter,
     wanted: Wanted,
+    open: RefCell<Arc<Open>>,
+}
+
+/// What is replaced when a device is opened anew.
+pub(super) struct Open {
+    pub(super) raw: wgpu::Device,
+    pub(super) queue: wgpu::Queue,
     lost: Arc<Mutex<Option<String>>>,
 }
 
@@ -31,10 +38,8 @@ impl Device {
     /// [`Kind::NoAdapter`] where the machine has no adapter, [`Kind::WrongAdapter`] where it lacks the wanted one or
     /// the adapter computes wrong numbers, [`Kind::Refused`] where the device cannot be opened.
     pub fn open(wanted: &Wanted) -> Result<Device> {
-        let mut raw = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::PRIMARY));
-        let all: Vec<Adapter> = raw.iter().map(|a| Adapter::of(&a.get_info())).collect();
-        let at = chosen(&all, wanted)?;
-        let device = Device::on(&raw.swap_remove(at), wanted)?;
+        let (adapter, open) = opened(wanted)?;
+        let device = Device { adapter, wanted: wanted.clone(), open: RefCell::new(Arc::new(open)) };
         device.first_run()?;
         Ok(device)
     }
@@ -45,66 +50,27 @@ impl Device {
         skipped(Device::open(wanted))
     }
 
-    /// The same adapter opened anew, after a run that timed out or lost the device.
-    pub(crate) fn anew(&self) -> Result<Device> {
-        let device = Device::open(&self.wanted)?;
-        if device.adapter != self.adapter {
-            let what = format!("{} was opened in place of {}", device.adapter, self.adapter);
+    /// Opens the same adapter anew where an earlier run did not end in time or lost the device.
+    pub(crate) fn revive(&self) -> Result<()> {
+        if self.current().alive(&self.adapter).is_ok() {
+            return Ok(());
+        }
+        let (adapter, open) = opened(&self.wanted)?;
+        if adapter != self.adapter {
+            let what = format!("{adapter} was opened in place of {}", self.adapter);
             return Err(Error::new(Kind::WrongAdapter, what).cause("the adapter was unplugged or its driver crashed"));
         }
-        Ok(device)
+        self.open.replace(Arc::new(open));
+        self.first_run()
+    }
+
+    pub(super) fn current(&self) -> Arc<Open> {
+        self.open.borrow().clone()
     }
 
     /// The adapter, for reports.
     pub fn adapter(&self) -> &Adapter {
         &self.adapter
-    }
-
-    fn on(chosen: &wgpu::Adapter, wanted: &Wanted) -> Result<Device> {
-        let adapter = Adapter::of(&chosen.get_info());
-        // What shaders can ask for by themselves; the rest of the features does not concern compute shaders.
-        let known = wgpu::Features::SHADER_F16
-            | wgpu::Features::SUBGROUP
-            | wgpu::Features::SHADER_INT64
-            | wgpu::Features::SHADER_F64;
-        let (raw, queue) = pollster::block_on(chosen.request_device(&wgpu::DeviceDescriptor {
-            label: Some("shader-twin"),
-            required_features: chosen.features() & known,
-            // All that the adapter has: a stage is refused by its own adapter's limits only.
-            required_limits: chosen.limits(),
-            ..Default::default()
-        }))
-        .map_err(|e| {
-            Error::new(Kind::Refused, format!("{adapter}: the device cannot be opened: {e}"))
-                .cause("the driver is broken or its memory is used up")
-                .next("close other programs, or ask for another adapter")
-        })?;
-        let lost = Arc::new(Mutex::new(None::<String>));
-        let note = lost.clone();
-        raw.set_device_lost_callback(move |reason, message| {
-            note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(format!("{reason:?}: {message}"));
-        });
-        // Errors of our own calls are caught where they are made; what arrives later is the device's.
-        let note = lost.clone();
-        raw.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
-            note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(e.to_string());
-        }));
-        Ok(Device { raw, queue, adapter, wanted: wanted.clone(), lost })
-    }
-
-    pub(super) fn alive(&self) -> Result<()> {
-        match &*self.lost.lock().unwrap_or_else(PoisonError::into_inner) {
-            None => Ok(()),
-            Some(why) => Err(Error::new(Kind::Lost, format!("{}: the device was lost: {}", self.adapter, why.trim()))
-                .cause("the shader ran too long for the driver, the driver crashed, or its memory ran out")
-                .next("open the device anew")),
-        }
-    }
-
-    /// A device that does not answer is never used again. It is not closed either: closing waits for it.
-    pub(super) fn give_up(&self, why: &str) {
-        self.lost.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(why.into());
-        std::mem::forget((self.raw.clone(), self.queue.clone()));
     }
 
     /// Proves that dispatches run: wrong numbers here would make every later comparison worthless.
@@ -121,6 +87,59 @@ impl Device {
                 .cause("the driver is broken, or it computes nothing")
                 .next("ask for another adapter"))
         })
+    }
+}
+
+/// Opens the best adapter that was asked for.
+fn opened(wanted: &Wanted) -> Result<(Adapter, Open)> {
+    let mut raw = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::PRIMARY));
+    let all: Vec<Adapter> = raw.iter().map(|a| Adapter::of(&a.get_info())).collect();
+    let at = chosen(&all, wanted)?;
+    let (chosen, adapter) = (raw.swap_remove(at), all[at].clone());
+    // What shaders can ask for by themselves; the rest of the features does not concern compute shaders.
+    let known = wgpu::Features::SHADER_F16
+        | wgpu::Features::SUBGROUP
+        | wgpu::Features::SHADER_INT64
+        | wgpu::Features::SHADER_F64;
+    let (raw, queue) = pollster::block_on(chosen.request_device(&wgpu::DeviceDescriptor {
+        label: Some("shader-twin"),
+        required_features: chosen.features() & known,
+        // All that the adapter has: a stage is refused by its own adapter's limits only.
+        required_limits: chosen.limits(),
+        ..Default::default()
+    }))
+    .map_err(|e| {
+        Error::new(Kind::Refused, format!("{adapter}: the device cannot be opened: {e}"))
+            .cause("the driver is broken or its memory is used up")
+            .next("close other programs, or ask for another adapter")
+    })?;
+    let lost = Arc::new(Mutex::new(None::<String>));
+    let note = lost.clone();
+    raw.set_device_lost_callback(move |reason, message| {
+        note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(format!("{reason:?}: {message}"));
+    });
+    // Errors of our own calls are caught where they are made; what arrives later is the device's.
+    let note = lost.clone();
+    raw.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
+        note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(e.to_string());
+    }));
+    Ok((adapter, Open { raw, queue, lost }))
+}
+
+impl Open {
+    pub(super) fn alive(&self, adapter: &Adapter) -> Result<()> {
+        match &*self.lost.lock().unwrap_or_else(PoisonError::into_inner) {
+            None => Ok(()),
+            Some(why) => Err(Error::new(Kind::Lost, format!("{adapter}: the device was lost: {}", why.trim()))
+                .cause("the shader ran too long for the driver, the driver crashed, or its memory ran out")
+                .next("run it again: the device is opened anew")),
+        }
+    }
+
+    /// A device that does not answer is never used again. It is not closed either: closing waits for it.
+    pub(super) fn give_up(&self, why: &str) {
+        self.lost.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(why.into());
+        std::mem::forget((self.raw.clone(), self.queue.clone()));
     }
 }
 

@@ -1,6 +1,6 @@
 //! In: a stage, a shader's text and a case. Out: the words of every binding after the dispatch.
 
-use super::Device;
+use super::open::{Device, Open};
 use crate::case::Case;
 use crate::contract::pipeline_keys;
 use crate::error::{Error, Kind, Result};
@@ -46,23 +46,24 @@ impl<F: Future<Output = Option<wgpu::Error>>> Caught for F {
 impl Device {
     /// Compiles a text with the bindings of a stage.
     pub(crate) fn compile(&self, stage: &Stage, wgsl: &str, overrides: &[(String, f64)]) -> Result<Compiled> {
-        self.alive()?;
+        let open = self.current();
+        open.alive(self.adapter())?;
         let what = format!("{}: {}: the shader cannot be compiled", self.adapter(), stage.name);
         let keys = keys(wgsl, overrides);
         let constants: Vec<(&str, f64)> = keys.iter().map(|(key, value)| (key.as_str(), *value)).collect();
-        checked(&self.raw, &what, || {
-            let layouts = self.layouts(stage);
-            let module = self.raw.create_shader_module(wgpu::ShaderModuleDescriptor {
+        checked(&open.raw, &what, || {
+            let layouts = open.layouts(stage);
+            let module = open.raw.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(&stage.name),
                 source: wgpu::ShaderSource::Wgsl(wgsl.into()),
             });
             let bind_group_layouts: Vec<_> = layouts.iter().map(Option::as_ref).collect();
-            let layout = self.raw.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            let layout = open.raw.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some(&stage.name),
                 bind_group_layouts: &bind_group_layouts,
                 immediate_size: 0,
             });
-            let pipeline = self.raw.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            let pipeline = open.raw.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(&stage.name),
                 layout: Some(&layout),
                 module: &module,
@@ -74,6 +75,57 @@ impl Device {
         })
     }
 
+    /// Runs a case once and gives the words of all bindings afterwards; those that are only read are as before.
+    pub(crate) fn run(
+        &self,
+        compiled: &Compiled,
+        stage: &Stage,
+        case: &Case,
+        time_limit: Duration,
+    ) -> Result<Vec<Words>> {
+        let open = self.current();
+        open.alive(self.adapter())?;
+        let what = format!("{}: {}: case '{}' cannot run", self.adapter(), stage.name, case.name);
+        let (submission, staging) = checked(&open.raw, &what, || open.submitted(compiled, stage, case))?;
+        open.alive(self.adapter())?;
+        let (sender, receiver) = mpsc::channel();
+        staging.map_async(wgpu::MapMode::Read, .., move |mapped| {
+            // The receiver is gone where the wait was given up.
+            let _ = sender.send(mapped);
+        });
+        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(time_limit) };
+        if let Err(e) = open.raw.poll(wait) {
+            open.give_up("an earlier run did not end in time");
+            let what = format!("{what}: no end within {} s: {e}", time_limit.as_secs_f64());
+            return Err(Error::new(Kind::TimedOut, what)
+                .cause("a loop of the shader does not end, or the case is large")
+                .next("raise the time limit (Pair::time_limit), or make the case smaller"));
+        }
+        open.alive(self.adapter())?;
+        let mapped = receiver.try_recv();
+        if !matches!(mapped, Ok(Ok(()))) {
+            let error = Error::new(Kind::Lost, format!("{what}: the result cannot be read: {mapped:?}"));
+            return Err(error.cause("the device was lost or its memory ran out"));
+        }
+        let view = staging.get_mapped_range(..);
+        let view = view.map_err(|e| Error::new(Kind::Lost, format!("{what}: the result cannot be read: {e}")))?;
+        let mut at = 0;
+        Ok(stage
+            .bindings
+            .iter()
+            .zip(&case.bindings)
+            .map(|(binding, given)| {
+                if binding.access != Access::ReadWrite {
+                    return given.clone();
+                }
+                at += given.bytes();
+                Words::of(&view[at - given.bytes()..at])
+            })
+            .collect())
+    }
+}
+
+impl Open {
     fn layouts(&self, stage: &Stage) -> Vec<Option<wgpu::BindGroupLayout>> {
         let places: Vec<(u32, u32)> = (0..stage.bindings.len()).map(|i| stage.place(i)).collect();
         let last = places.iter().map(|p| p.0).max();
@@ -97,54 +149,6 @@ impl Device {
                 (!entries.is_empty()).then(|| self.raw.create_bind_group_layout(&descriptor))
             })
             .collect()
-    }
-
-    /// Runs a case once and gives the words of all bindings afterwards; those that are only read are as before.
-    pub(crate) fn run(
-        &self,
-        compiled: &Compiled,
-        stage: &Stage,
-        case: &Case,
-        time_limit: Duration,
-    ) -> Result<Vec<Words>> {
-        self.alive()?;
-        let what = format!("{}: {}: case '{}' cannot run", self.adapter(), stage.name, case.name);
-        let (submission, staging) = checked(&self.raw, &what, || self.submitted(compiled, stage, case))?;
-        self.alive()?;
-        let (sender, receiver) = mpsc::channel();
-        staging.map_async(wgpu::MapMode::Read, .., move |mapped| {
-            // The receiver is gone where the wait was given up.
-            let _ = sender.send(mapped);
-        });
-        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(time_limit) };
-        if let Err(e) = self.raw.poll(wait) {
-            self.give_up("an earlier run did not end in time");
-            let what = format!("{what}: no end within {} s: {e}", time_limit.as_secs_f64());
-            return Err(Error::new(Kind::TimedOut, what)
-                .cause("a loop of the shader does not end, or the case is large")
-                .next("raise the time limit (Pair::time_limit), or make the case smaller"));
-        }
-        self.alive()?;
-        let mapped = receiver.try_recv();
-        if !matches!(mapped, Ok(Ok(()))) {
-            let error = Error::new(Kind::Lost, format!("{what}: the result cannot be read: {mapped:?}"));
-            return Err(error.cause("the device was lost or its memory ran out"));
-        }
-        let view = staging.get_mapped_range(..);
-        let view = view.map_err(|e| Error::new(Kind::Lost, format!("{what}: the result cannot be read: {e}")))?;
-        let mut at = 0;
-        Ok(stage
-            .bindings
-            .iter()
-            .zip(&case.bindings)
-            .map(|(binding, given)| {
-                if binding.access != Access::ReadWrite {
-                    return given.clone();
-                }
-                at += given.bytes();
-                Words::of(&view[at - given.bytes()..at])
-            })
-            .collect())
     }
 
     fn submitted(&self, compiled: &Compiled, stage: &Stage, case: &Case) -> (wgpu::SubmissionIndex, wgpu::Buffer) {

@@ -35,7 +35,7 @@ pub(crate) struct Trial<'a> {
 pub(crate) fn judged(device: &Device, trial: Trial, explained: &[Explained]) -> Result<Mutants> {
     let stage = trial.stage;
     let cases = trial.cases.clone();
-    let mut run = Run { device, renewed: None, trial };
+    let mut run = Run { device, trial };
     let mut found = Mutants { turns: run.turns()?, ..Mutants::default() };
     let mut seen = HashSet::from([program(stage, &stage.wgsl, &cases).map_err(|e| run.usage(e))?]);
     for change in changes(&stage.wgsl) {
@@ -89,8 +89,6 @@ enum Outcome {
 
 struct Run<'a> {
     device: &'a Device,
-    /// Opened in place of the first one, once that gave no answer.
-    renewed: Option<Device>,
     /// The case that noticed the last mutant comes first.
     trial: Trial<'a>,
 }
@@ -102,10 +100,9 @@ impl Run<'_> {
 
     /// The position of the first case that differs from the twin.
     fn differs(&self, wgsl: &str) -> Result<Option<usize>> {
-        let device = self.renewed.as_ref().unwrap_or(self.device);
         let mut pipelines = Vec::new();
         for (i, (case, twin)) in self.trial.cases.iter().enumerate() {
-            let out = run_case(device, self.trial.stage, wgsl, case, &mut pipelines, self.trial.time_limit)?;
+            let out = run_case(self.device, self.trial.stage, wgsl, case, &mut pipelines, self.trial.time_limit)?;
             if !compared(self.trial.stage, self.trial.rule, case, &out, twin).passed() {
                 return Ok(Some(i));
             }
@@ -143,7 +140,7 @@ impl Run<'_> {
             Err(e) => match e.kind() {
                 Kind::Refused => Ok(Outcome::Refused),
                 Kind::TimedOut | Kind::Lost => {
-                    self.renewed = Some(self.device.anew()?);
+                    self.device.revive()?;
                     Ok(Outcome::TimedOut)
                 }
                 _ => Err(e),
@@ -164,17 +161,18 @@ mod tests {
             @compute @workgroup_size(1) fn main() { words[0] = 64u; }";
         let words = Binding::read_write("words", Shape::array::<u32>(), Tolerance::exact("whole numbers"));
         let stage = Stage::new("s", text, "main", [1, 1, 1], vec![words]);
-        let (case, twin) = (Case::new("c", [1024, 1, 1]).with(&[0u32]), [Words::of(&[64u32])]);
+        let (case, twin) = (Case::new("c", [64, 1, 1]).with(&[0u32]), [Words::of(&[64u32])]);
         let (stage, cases) = (&stage, vec![(&case, &twin[..])]);
         let trial = Trial { stage, rule: None, cases, time_limit: Duration::from_millis(1) };
-        let mut run = Run { device: &device, renewed: None, trial };
+        let mut run = Run { device: &device, trial };
         // Every turn needs the one before: at least 20 ms on the fastest GPU.
         let turn = "for (var i = 0u; i < 3000000u; i++) { words[0] = (words[0] ^ (i << 5u)) * 747796405u; }";
         let slow = text.replace("words[0] = 64u;", turn);
-        let ended = run.outcome(&slow);
-        assert!(matches!(ended, Ok(Outcome::TimedOut)), "{ended:?}");
+        // A busy machine may wake this thread only after the end. More work would be no way out: SwiftShader's next
+        // device waits for it.
+        assert!((0..5).any(|_| matches!(run.outcome(&slow), Ok(Outcome::TimedOut))));
         run.trial.time_limit = Duration::from_secs(60);
-        assert!(run.renewed.is_some() && matches!(run.outcome("no WGSL"), Ok(Outcome::Refused)));
+        assert!(matches!(run.outcome("no WGSL"), Ok(Outcome::Refused)));
         assert!(matches!(run.outcome(text), Ok(Outcome::Survived)));
         assert!(matches!(run.outcome(&text.replace("64u", "65u")), Ok(Outcome::Noticed)));
     }

@@ -46,7 +46,8 @@ pub struct Explained {
 /// A mutant may loop without end. Every loop of a mutant gets a counter: an invocation leaves all its loops once it
 /// has taken [`Mutants::turns`] turns in all of them together, which is at least four times what the shader itself
 /// needs. A device that does not answer within the time limit is given up and opened anew; the mutant counts as
-/// noticed. Its dispatch may keep a processor busy until the program ends.
+/// noticed. Its dispatch may keep a processor busy until the program ends, and SwiftShader runs nothing else until the
+/// dispatch ends.
 #[derive(Clone, Debug, Default)]
 pub struct Mutants {
     /// A case differed from the twin.
