@@ -153,7 +153,7 @@ def test_pictures_cameras_parts_and_figures(read, arrays, made):
         assert (message.encoding, message.height, message.width, message.step) == ("mono8", 480, 640, 640)
         assert (np.frombuffer(bytes(message.data), np.uint8).reshape(480, 640) == true).all()
     assert len(read["/sheetlight/picture"]) == len(read["/sheetlight/camera_info"]) == len(pictures)
-    camera = made.station.camera
+    camera = made.station.camera.value
     for _, message in read["/sheetlight/camera_info"]:
         assert (message.distortion_model, message.width, message.height) == ("plumb_bob", 640, 480)
         k, d = (getattr(message, name, getattr(message, name.upper(), None)) for name in "kd")

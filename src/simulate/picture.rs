@@ -6,7 +6,6 @@ use super::light::{Canvas, View};
 use super::sensor::Sensor;
 use crate::geometry::{Vec2, Vec3};
 use crate::raster::Image;
-use rand::Rng;
 use rand_distr::{Distribution, Gamma, StandardNormal};
 use rand_pcg::Pcg64;
 
