@@ -197,7 +197,9 @@ fn a_recording_and_a_station_add_pictures_cameras_and_the_flange() {
     for (m, pose) in all["/tf"].iter().zip(&poses) {
         let mut w = Wire::new(&m.data);
         assert_eq!(w.u32(), 2);
-        (w.header("base"), w.string(), w.f64s(7));
+        w.header("base");
+        w.string();
+        w.f64s(7);
         w.header("base");
         assert_eq!(w.string(), "flange");
         let (far, turn) = w.apart(pose);
@@ -205,7 +207,9 @@ fn a_recording_and_a_station_add_pictures_cameras_and_the_flange() {
     }
     let mut w = Wire::new(&all["/tf_static"][0].data);
     assert_eq!(w.u32(), 2);
-    (w.header("camera"), w.string(), w.f64s(7));
+    w.header("camera");
+    w.string();
+    w.f64s(7);
     w.header("flange");
     assert_eq!(w.string(), "camera_reported");
     let (far, turn) = w.apart(&rig.need_hand_eye().unwrap().value);

@@ -17,7 +17,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 #[derive(Parser)]
 #[command(name = "sheetlight", version, max_term_width = 100, disable_help_flag = true)]
 #[command(
-    after_help = "A first look: sheetlight demo. Your own rig: docs/getting-started.md. More: sheetlight help COMMAND"
+    after_help = "To try it: sheetlight demo. Your own rig: docs/getting-started.md. More: sheetlight help COMMAND"
 )]
 struct Cli {
     /// Print the result as JSON on stdout
