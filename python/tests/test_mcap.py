@@ -140,8 +140,9 @@ def test_the_camera_is_where_the_scan_has_it(read, by_program, made):
         assert (camera.header.frame_id, camera.child_frame_id) == ("base", "camera")
         assert (flange.header.frame_id, flange.child_frame_id) == ("base", "flange")
         assert stamp(camera.header) == stamp(flange.header) == time
-        assert np.allclose(matrix(camera.transform.translation, camera.transform.rotation), place, atol=1e-9)
-        assert np.allclose(matrix(flange.transform.translation, flange.transform.rotation), poses[shot], atol=1e-9)
+        assert np.allclose(matrix(camera.transform.translation, camera.transform.rotation), place, rtol=0, atol=1e-9)
+        assert np.allclose(matrix(flange.transform.translation, flange.transform.rotation), poses[shot],
+                           rtol=0, atol=1e-9)
     ((_, static),) = read["/tf_static"]
     names = [(t.header.frame_id, t.child_frame_id) for t in static.transforms]
     assert names == [("camera", "laser"), ("flange", "camera_reported")]
@@ -160,7 +161,7 @@ def test_pictures_cameras_parts_and_figures(read, arrays, made):
         assert np.array_equal(np.reshape(k, (3, 3)), camera.matrix)
         assert np.array_equal(d, np.ravel(camera.distortion)[:5])
     ((_, part),) = read["/sheetlight/part"]
-    assert np.allclose(matrix(part.pose.position, part.pose.orientation), PART, atol=1e-12)
+    assert np.allclose(matrix(part.pose.position, part.pose.orientation), PART, rtol=0, atol=1e-12)
     ((_, figures),) = read["/diagnostics"]
     (status,) = figures.status
     values = {v.key: v.value for v in status.values}
