@@ -103,7 +103,7 @@ fn orientations([w, h]: [u32; 2]) -> impl Iterator<Item = (bool, [bool; 2])> {
     (0..if w == h { 8 } else { 4 }).map(|i| (i & 4 != 0, [i & 1 != 0, i & 2 != 0]))
 }
 
-/// By how much most pairs differ once the calibrated ones are turned like this, and how many do.
+/// The most frequent move from a calibrated hot pixel, turned like this, to a seen one, and the pairs that have it.
 fn best_move(
     seen: &[[u32; 2]],
     calibrated: &[[u32; 2]],

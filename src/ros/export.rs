@@ -95,7 +95,7 @@ struct Input<'a> {
     last: u32,
 }
 
-/// Writes the file. `progress` is told (points done, points in all).
+/// Writes the file. `progress` is called with (points done, all points).
 ///
 /// # Errors
 /// A file that is there already or cannot be written; a scan without points or whose files are not those that it wrote;

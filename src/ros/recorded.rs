@@ -81,7 +81,7 @@ impl<'a> Recorded<'a> {
         self.frame(shot).and_then(|f| f.laser.as_ref()).map(|name| self.recording.picture(name)).transpose()
     }
 
-    /// The times of these shots; in words why there are none.
+    /// The times of these shots. The error says in words why the recording gives none.
     pub fn clock(&self, shots: &[u32]) -> Result<std::result::Result<Clock, String>> {
         let taken = |shot: &u32| Some((*shot, self.frame(*shot)?.taken.as_ref()?));
         let without: Vec<u32> = shots.iter().copied().filter(|s| taken(s).is_none()).collect();

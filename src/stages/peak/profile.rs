@@ -63,7 +63,7 @@ pub(super) fn by_columns((nx, ny): (f32, f32)) -> bool {
 /// sixth of a width beside its middle, and all its samples have the same columns.
 pub(in crate::stages) const STILL: f32 = 0.05;
 
-/// By how much the middle of a window along the stripe moves along a from row to row.
+/// Shift of the middle of a window along the stripe from one row to the next, px along a.
 #[inline(always)]
 fn lean(na: f32, nb: f32) -> f32 {
     let lean = na * nb;
@@ -135,8 +135,8 @@ struct Window {
     full_scale: i32,
 }
 
-/// A column of a window, or four of them: the first beside the skeleton's pixel, by how much they follow the line,
-/// their weights.
+/// One column of a window, or four neighbouring ones: offset of the first from the skeleton's pixel, shift along the
+/// line, weights.
 struct Column {
     i: i32,
     shift: i32,
