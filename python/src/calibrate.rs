@@ -13,8 +13,10 @@ use sheetlight::calibrate::camera::procedure::{CameraOptions, CameraResult, cali
 use sheetlight::calibrate::camera::report::page;
 use sheetlight::calibrate::hand_eye::options::{HandEyeOptions, Mount};
 use sheetlight::calibrate::laser_plane::options::LaserPlaneOptions;
+use sheetlight::calibrate::limits::Asked;
 use sheetlight::fault::{Fault, Result};
 use sheetlight::recording;
+use sheetlight::rig::Volume;
 use sheetlight::scan::Where;
 use sheetlight::station::volume::asked;
 use sheetlight::station::{
@@ -60,7 +62,9 @@ pub fn calibrate_camera(
     }
     let solve =
         SolveOptions { lens: word::<Lens>(lens)?, skew, boards: word::<Boards>(board)?, ..SolveOptions::default() };
-    let options = CameraOptions { solve, working_distance_mm: working_mm, ..CameraOptions::default() };
+    let working = working_mm.map(|mm| Volume::new(mm, mm, "stated"));
+    let asked = Asked { working, tolerance_mm: None };
+    let options = CameraOptions { solve, asked, ..CameraOptions::default() };
     let progress = Progress::new(progress);
     let opened: Vec<recording::Recording> = recordings.iter().map(|r| r.inner.clone()).collect();
     let result = progress.run(py, || calibrate(&opened, &options, &|done, all| progress.tell(done, Some(all))))?;

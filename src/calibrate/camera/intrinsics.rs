@@ -3,7 +3,7 @@
 //! Frame and unit: pixels; board and camera frames in mm.
 
 use super::bundle::{Bent, Corner, State};
-use super::choice::{by_evidence, by_families, by_shape, resized, shaped};
+use super::choice::{Doubt, by_evidence, by_families, by_shape, resized, shaped};
 use super::fit::Fit;
 use super::lens::Lens;
 use super::zhang::{Seen, first_camera};
@@ -101,6 +101,8 @@ pub struct Solved {
     pub iterations: usize,
     /// Whether it is a minimum.
     pub end: End,
+    /// Families of lens terms that fit better and are not believed; the covariance contains what they would move.
+    pub doubts: Vec<Doubt>,
     /// What is believed of the board's shape.
     bent: Option<Bent>,
 }
@@ -153,8 +155,9 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
             .cause("the pictures show several boards, or too few of one")
             .next("use pictures of one board, 8 or more, or take it as drawn (--board drawn)"));
     }
+    let mut doubts = Vec::new();
     if options.lens == Lens::Evidence {
-        by_families(&fit, &mut solution, &mut held);
+        doubts = by_families(&fit, &mut solution, &mut held);
         resized(&mut fit, &mut solution, &held);
         by_evidence(&fit, &mut solution, &mut held);
     }
@@ -163,7 +166,12 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
     if solution.state.camera.iter().any(|x| !x.is_finite()) {
         return Err(unsolved());
     }
-    Ok(finish(&fit, solution, end, held))
+    let mut solved = finish(&fit, solution, end, held);
+    if let Some(stated) = solved.covariance {
+        let added = doubts.iter().filter_map(|d| d.covariance(&solved.intrinsics, &stated));
+        solved.covariance = Some(added.fold(stated, |sum, more| sum + more));
+    }
+    Ok(Solved { doubts, ..solved })
 }
 
 /// The same camera from some of its pictures, with what was chosen from all of them.
@@ -256,5 +264,6 @@ fn finish(fit: &Fit<'_>, solution: Solution<State>, end: End, held: Vec<usize>) 
         condition: solution.condition,
         iterations: solution.iterations,
         end,
+        doubts: Vec::new(),
     }
 }

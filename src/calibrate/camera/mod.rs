@@ -14,3 +14,5 @@ pub mod ray_error;
 mod repeat;
 pub mod report;
 pub mod zhang;
+
+pub use choice::Doubt;

@@ -2,6 +2,7 @@
 //! report shows (\[zhang00\]; docs/math.md, Camera calibration).
 //! Frame and unit: camera frame; pixels, mm, degrees where the name says so.
 
+use super::choice::Doubt;
 use super::intrinsics::{Boards, Observation, SolveOptions, Solved, solve};
 use super::lens::{Lens, further_names, held_names};
 use super::parts::apart;
@@ -9,12 +10,12 @@ use super::pictures::{Pictures, one_size, pictures};
 use super::quality;
 use super::ray_error::expected_ray_error;
 use crate::calibrate::boards::FindOptions;
-use crate::calibrate::limits::Judgement;
+use crate::calibrate::limits::{Asked, Judgement, Limits};
 use crate::camera::{ALWAYS_NAMED, Intrinsics, NAMES};
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
 use crate::recording::{Recording, hot_pixels, one_readout};
-use crate::rig::{Calibration, Covariance, Kind, Quality, Verdict};
+use crate::rig::{Calibration, Covariance, Kind, Quality, Verdict, Volume};
 use std::collections::BTreeMap;
 
 /// Settings of [`calibrate`].
@@ -24,20 +25,19 @@ pub struct CameraOptions {
     pub find: FindOptions,
     /// Of the solve.
     pub solve: SolveOptions,
-    /// Distance at which the expected error in mm is stated; the median distance of the boards where
-    /// it is not given. Above 0 mm.
-    pub working_distance_mm: Option<f64>,
+    /// Depths and tolerance by which the result is judged; without them the boards' median distance and a share of the
+    /// view.
+    pub asked: Asked,
 }
 
 impl CameraOptions {
     /// Refuses values out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         self.find.check()?;
-        match self.working_distance_mm {
-            Some(d) if !(d > 0.0 && d.is_finite()) => {
-                Err(Fault::usage(format!("working_distance_mm is {d}, a distance above 0 mm is needed"))
-                    .next("give the distance from the camera to the work in mm"))
-            }
+        self.asked.check()?;
+        match self.asked.working.as_ref().map(|w| w.near_mm) {
+            Some(d) if !(d > 0.0) => Err(Fault::usage(format!("the work is {d} mm away, more than 0 mm is needed"))
+                .next("give the distance from the camera to the work in mm")),
             _ => Ok(()),
         }
     }
@@ -205,11 +205,14 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 /// What a verdict rests on.
 struct Evidence<'a> {
     agreed: &'a Agreed,
-    /// Typical distance of the boards, and that at which the camera is judged, mm.
+    /// Typical distance of the boards, mm.
     distance: f64,
-    working: f64,
-    /// Of the viewing rays, px; infinite where the pictures do not determine all parameters.
+    /// Where the camera is judged, and by which tolerance.
+    limits: Limits,
+    /// Of the viewing rays over the image, px; infinite where the pictures do not determine all parameters.
     expected: f64,
+    /// The same where boards were seen.
+    expected_seen: f64,
     /// Spread of the boards' normals, degrees.
     tilt: f64,
     /// Share of the image in which corners were seen.
@@ -228,13 +231,15 @@ fn judge(
     let Agreed { pictures, solved, .. } = agreed;
     let k = &solved.intrinsics;
     let distance = quality::typical_distance(pictures, &solved.camera_from_board);
+    let covered = quality::Covered::by(pictures, k.width, k.height);
     let evidence = Evidence {
         agreed,
         distance,
-        working: options.working_distance_mm.unwrap_or(distance),
+        limits: options.asked.limits(&Volume::new(distance, distance, "where the boards were"), |z| k.view_mm(z)),
         expected: solved.covariance.as_ref().map_or(f64::INFINITY, |c| expected_ray_error(k, c)),
+        expected_seen: solved.covariance.as_ref().map_or(f64::INFINITY, |c| covered.ray_error(k, c)),
         tilt: quality::tilt_spread_deg(&solved.camera_from_board),
-        covered: quality::coverage(pictures, k.width, k.height),
+        covered: covered.share(),
         corners: pictures.iter().map(|o| o.view.points.len()).sum(),
         held_out: Some(rms(hold_out.iter().flatten().copied())).filter(|r| r.is_finite() && *r > 0.0),
     };
@@ -252,6 +257,7 @@ fn judge(
     }));
     j.reasons.extend(held_parameters(solved, options.solve.lens));
     j.reasons.extend(further_parameters(solved, options.solve.lens));
+    j.reasons.extend(solved.doubts.iter().map(doubted));
     let shape = board_shape(pictures, solved);
     let told = options.solve.boards == Boards::Evidence;
     j.reasons.extend(shape.map(|[flat, lifted]| {
@@ -289,7 +295,7 @@ fn judge(
 impl Evidence<'_> {
     /// Whether the pictures are enough, and their boards tilted enough, for what is wanted of the viewing rays.
     fn determined(&self, j: &mut Judgement) {
-        let (pictures, tilt, expected) = (self.agreed.pictures.len(), self.tilt, self.expected);
+        let (pictures, tilt) = (self.agreed.pictures.len(), self.tilt);
         j.at_best(Verdict::BadlyDetermined, pictures < 3, || {
             format!("{pictures} pictures: nothing is left over to check the result with; 3 are the least, 10 the rule")
         });
@@ -300,16 +306,27 @@ impl Evidence<'_> {
                  be separated"
             )
         });
-        j.at_best(Verdict::BadlyDetermined, expected > 0.5, || {
-            if expected.is_finite() {
-                format!("the viewing rays are known to {expected:.2} px only, the limit is 0.5 px")
-            } else {
-                "the pictures do not determine all parameters".into()
-            }
-        });
-        j.at_best(Verdict::Usable, expected > 0.1 && expected <= 0.5, || {
-            format!("the viewing rays are known to {expected:.2} px; 0.1 px is good")
-        });
+        if !self.expected_seen.is_finite() {
+            j.at_best(Verdict::BadlyDetermined, true, || "the pictures do not determine all parameters".into());
+            return;
+        }
+        let (seen, depth) = (self.expected_seen, self.limits.middle());
+        let says = format!(
+            "where boards were seen the viewing rays are known to {seen:.2} px, {:.3} mm at {} mm",
+            seen * self.mm_per_px(),
+            self.limits.working.depth(depth)
+        );
+        let by_error = self.limits.by_error(seen * self.mm_per_px(), says);
+        if by_error.verdict > Verdict::Good {
+            j.verdict = j.verdict.max(by_error.verdict);
+            j.reasons.extend(by_error.reasons);
+        }
+    }
+
+    /// Size of a pixel at the distance of the work, mm.
+    fn mm_per_px(&self) -> f64 {
+        let k = &self.agreed.solved.intrinsics;
+        self.limits.middle() / (0.5 * (k.fx + k.fy))
     }
 
     /// Whether the model fits the pictures, those held out too, and all of the image.
@@ -334,8 +351,10 @@ impl Evidence<'_> {
         });
         j.at_best(Verdict::Usable, self.covered < 0.6, || {
             format!(
-                "corners cover {:.0} % of the image, 60 % are wanted: the lens is extrapolated elsewhere",
-                self.covered * 100.0
+                "corners cover {:.0} % of the image, 60 % are wanted: elsewhere the lens is extrapolated, and over the \
+                 whole image the viewing rays are known to {:.2} px",
+                self.covered * 100.0,
+                self.expected
             )
         });
     }
@@ -343,14 +362,15 @@ impl Evidence<'_> {
     fn figures(&self) -> BTreeMap<String, f64> {
         let Agreed { pictures, solved, left_out, .. } = self.agreed;
         let k = &solved.intrinsics;
-        let mm_per_px = self.working / (0.5 * (k.fx + k.fy));
         let mut figures = BTreeMap::from([
             ("rms_px".to_string(), solved.rms_px),
             ("corner_noise_ratio".into(), solved.sigma0),
             ("largest_scatter_from_picture_to_picture".into(), solved.repeat.max()),
             ("expected_ray_error_px".into(), self.expected),
-            ("expected_error_at_working_distance_mm".into(), self.expected * mm_per_px),
-            ("working_distance_mm".into(), self.working),
+            ("expected_ray_error_where_seen_px".into(), self.expected_seen),
+            ("expected_error_at_working_distance_mm".into(), self.expected_seen * self.mm_per_px()),
+            ("working_distance_mm".into(), self.limits.middle()),
+            ("tolerance_mm".into(), self.limits.tolerance_mm),
             ("pictures".into(), pictures.len() as f64),
             ("pictures_left_out".into(), left_out.len() as f64),
             ("corners".into(), self.corners as f64),
@@ -394,6 +414,16 @@ fn further_parameters(solved: &Solved, lens: Lens) -> Option<String> {
     let names = further_names(&solved.held);
     (lens == Lens::Evidence && !names.is_empty())
         .then(|| format!("{} estimated too: pictures that were not solved from fit better with them", names.join(", ")))
+}
+
+/// The terms that pictures ask for and that are not believed, in words.
+fn doubted(doubt: &Doubt) -> String {
+    let name: &str = doubt.lens.into();
+    format!(
+        "the {name} terms are not estimated: they explain {:.3} px of the features' errors, no more than print, blur \
+         and light do, and they would move the viewing rays by {:.2} px; half of that is in the stated uncertainty",
+        doubt.explained_px, doubt.rays_px
+    )
 }
 
 fn advise(

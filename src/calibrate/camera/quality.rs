@@ -3,7 +3,7 @@
 //! Frame and unit: pixels, mm, degrees where the name says so.
 
 use super::intrinsics::{Observation, SolveOptions, Solved, without};
-use super::ray_error::expected_ray_error;
+use super::ray_error::{expected_ray_error, expected_ray_error_at, raster};
 use crate::calibrate::boards::BoardView;
 use crate::calibrate::boards::shape::Shape;
 use crate::calibrate::projection::project;
@@ -23,14 +23,34 @@ pub fn tilt_spread_deg(poses: &[Rigid<Camera, Board>]) -> f64 {
     widest.to_degrees()
 }
 
-/// Share of the cells of an 8 x 6 raster in which a corner was seen.
-pub fn coverage(pictures: &[Observation], width: u32, height: u32) -> f64 {
-    let mut seen = [false; 48];
-    for p in pictures.iter().flat_map(|o| &o.view.points) {
-        let at = |v: f64, size: u32, n: usize| (((v + 0.5) / f64::from(size) * n as f64).max(0.0) as usize).min(n - 1);
-        seen[at(p.pixel.y, height, 6) * 8 + at(p.pixel.x, width, 8)] = true;
+/// Columns and rows of the raster by which it is stated where in the image boards were seen.
+const CELLS: [usize; 2] = [8, 6];
+
+/// The cells of a raster over the image in which a corner was seen, row by row.
+pub struct Covered([bool; CELLS[0] * CELLS[1]]);
+
+impl Covered {
+    /// By the corners of these pictures.
+    pub fn by(pictures: &[Observation], width: u32, height: u32) -> Covered {
+        let mut seen = [false; CELLS[0] * CELLS[1]];
+        for p in pictures.iter().flat_map(|o| &o.view.points) {
+            let at =
+                |v: f64, size: u32, n: usize| (((v + 0.5) / f64::from(size) * n as f64).max(0.0) as usize).min(n - 1);
+            seen[at(p.pixel.y, height, CELLS[1]) * CELLS[0] + at(p.pixel.x, width, CELLS[0])] = true;
+        }
+        Covered(seen)
     }
-    seen.iter().filter(|s| **s).count() as f64 / 48.0
+    /// Share of the image, 0 to 1.
+    pub fn share(&self) -> f64 {
+        self.0.iter().filter(|s| **s).count() as f64 / self.0.len() as f64
+    }
+    /// Expected error of the viewing rays in these cells, px: of four rays a cell, after the best rotation.
+    pub fn ray_error(&self, k: &Intrinsics, covariance: &ParameterMatrix) -> f64 {
+        let [columns, rows] = CELLS;
+        let cell = |i: usize| i / (2 * columns) / 2 * columns + i % (2 * columns) / 2;
+        let at = raster(k, 2 * columns, 2 * rows).enumerate().filter(|(i, _)| self.0[cell(*i)]);
+        expected_ray_error_at(k, covariance, at.map(|(_, px)| px))
+    }
 }
 
 /// Leave-one-out: the camera from all other pictures, with the lens's terms and the board's shape that were chosen from

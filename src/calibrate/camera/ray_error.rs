@@ -2,28 +2,28 @@
 //! Frame and unit: px.
 
 use crate::calibrate::projection::project;
-use crate::camera::{Intrinsics, PARAMETERS, ParameterMatrix};
+use crate::camera::{Intrinsics, PARAMETERS, ParameterMatrix, Parameters};
 use crate::geometry::{Vec2, Vec3, skew};
 use nalgebra::DMatrix;
 
-/// How viewing rays move over the image when the intrinsics do: rows are the displacements in px (u, v)
-/// on a 9 x 7 raster, with the part that a rotation of the whole camera would explain taken out
-/// (docs/math.md, Camera calibration (8)).
-fn ray_jacobian(k: &Intrinsics) -> DMatrix<f64> {
+/// Middles of the cells of a raster over the image, px, row by row.
+pub(super) fn raster(k: &Intrinsics, columns: usize, rows: usize) -> impl Iterator<Item = Vec2> {
+    let at = |i: usize, of: usize, size: u32| (i as f64 + 0.5) / of as f64 * f64::from(size) - 0.5;
+    let (width, height) = (k.width, k.height);
+    (0..columns * rows).map(move |i| Vec2::new(at(i % columns, columns, width), at(i / columns, rows, height)))
+}
+
+/// How viewing rays at some pixels move when the intrinsics do: rows are the displacements in px (u, v), with the part
+/// that a rotation of the whole camera would explain taken out (docs/math.md, Camera calibration (8)).
+fn ray_jacobian(k: &Intrinsics, at: impl Iterator<Item = Vec2>) -> DMatrix<f64> {
     let mut a = Vec::new();
     let mut b = Vec::new();
-    for j in 0..7 {
-        for i in 0..9 {
-            let px = Vec2::new(
-                (f64::from(i) + 0.5) / 9.0 * f64::from(k.width) - 0.5,
-                (f64::from(j) + 0.5) / 7.0 * f64::from(k.height) - 0.5,
-            );
-            let Some(n) = k.normalised_from_pixel(&px) else { continue };
-            let x = Vec3::new(n.x, n.y, 1.0);
-            let Some(p) = project(k, &x) else { continue };
-            a.push(p.by_intrinsics);
-            b.push(p.by_point * -skew(&x));
-        }
+    for px in at {
+        let Some(n) = k.normalised_from_pixel(&px) else { continue };
+        let x = Vec3::new(n.x, n.y, 1.0);
+        let Some(p) = project(k, &x) else { continue };
+        a.push(p.by_intrinsics);
+        b.push(p.by_point * -skew(&x));
     }
     let rows = 2 * a.len();
     let a = DMatrix::from_fn(rows, PARAMETERS, |r, c| a[r / 2][(r % 2, c)]);
@@ -34,14 +34,37 @@ fn ray_jacobian(k: &Intrinsics) -> DMatrix<f64> {
 
 /// Rms distance of one camera's viewing rays from another's over the image, px, after the best rotation.
 pub(super) fn rays_apart(a: &Intrinsics, b: &Intrinsics) -> f64 {
-    let moved = ray_jacobian(a) * (b.parameters() - a.parameters());
+    let moved = ray_jacobian(a, raster(a, 9, 7)) * (b.parameters() - a.parameters());
     (moved.norm_squared() / (moved.len() as f64 / 2.0)).sqrt()
+}
+
+/// Change of the parameters that a covariance tells of, so that the viewing rays move as by `moved` of all parameters:
+/// to `sigma_px` or as near as the covariance makes likely. `None` where no ray can be followed.
+pub(super) fn following(
+    k: &Intrinsics,
+    covariance: &ParameterMatrix,
+    moved: &Parameters,
+    sigma_px: f64,
+) -> Option<Parameters> {
+    let j = ray_jacobian(k, raster(k, 9, 7));
+    let spread: nalgebra::OMatrix<f64, nalgebra::Const<PARAMETERS>, nalgebra::Dyn> = covariance * j.transpose();
+    let own = &j * &spread + DMatrix::identity(j.nrows(), j.nrows()) * sigma_px.powi(2);
+    Some(spread * own.cholesky()?.solve(&(&j * moved)))
 }
 
 /// Expected rms displacement of the viewing rays over the image, px, after the best rotation, from
 /// the covariance of the camera's parameters.
 pub fn expected_ray_error(k: &Intrinsics, covariance: &ParameterMatrix) -> f64 {
-    let j = ray_jacobian(k);
+    expected_ray_error_at(k, covariance, raster(k, 9, 7))
+}
+
+/// The same at some pixels only, after the rotation that suits these best.
+pub(super) fn expected_ray_error_at(
+    k: &Intrinsics,
+    covariance: &ParameterMatrix,
+    at: impl Iterator<Item = Vec2>,
+) -> f64 {
+    let j = ray_jacobian(k, at);
     let sum: f64 = (&j * covariance).component_mul(&j).sum();
     (sum / (j.nrows() as f64 / 2.0)).max(0.0).sqrt()
 }

@@ -12,6 +12,7 @@ use crate::fault::Result;
 use crate::raster::Channel;
 use crate::recording::Recording;
 use crate::station::Settings;
+use crate::station::volume::asked;
 use std::path::PathBuf;
 
 /// Calibrate the camera from pictures of a board
@@ -42,7 +43,7 @@ pub struct Args {
     /// estimated)
     #[arg(long, default_value = "evidence", value_parser = crate::cli::terminal::arguments::parse::<Boards>)]
     board: Boards,
-    /// Distance at which the expected error is stated, mm [default: middle of the working volume, else of the boards]
+    /// Distance at which the expected error is judged, mm [default: middle of the working volume, else of the boards]
     #[arg(long, value_name = "MM")]
     working_mm: Option<f64>,
     /// Channel of a colour picture: red, green, blue or luma
@@ -58,7 +59,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     recordings.iter_mut().for_each(|r| r.channel = args.channel);
     let options = CameraOptions {
         solve: SolveOptions { lens: args.lens, skew: args.skew, boards: args.board, ..SolveOptions::default() },
-        working_distance_mm: args.working_mm.or(settings.volume().map(|v| v.middle())),
+        asked: asked(&settings, args.working_mm.map(|mm| [mm, mm])),
         ..CameraOptions::default()
     };
     let pictures: usize = recordings.iter().map(|r| r.meta.frames.len()).sum();
@@ -79,8 +80,8 @@ fn parameters(result: &CameraResult) -> String {
     }
     let figure = |name: &str| c.quality.figures.get(name).copied().unwrap_or(f64::NAN);
     text += &format!(
-        "\nexpected error of the viewing rays {:.4} px, {:.4} mm at {:.0} mm",
-        figure("expected_ray_error_px"),
+        "\nexpected error of the viewing rays where boards were seen {:.4} px, {:.4} mm at {:.0} mm",
+        figure("expected_ray_error_where_seen_px"),
         figure("expected_error_at_working_distance_mm"),
         figure("working_distance_mm"),
     );

@@ -8,5 +8,6 @@ mod held_out;
 mod shape;
 
 pub(super) use evidence::by_evidence;
+pub use families::Doubt;
 pub(super) use families::by_families;
 pub(super) use shape::{by_shape, resized, shaped};

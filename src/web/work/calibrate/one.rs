@@ -35,8 +35,7 @@ pub(in crate::web::work) fn calibrate(this: &Run, target: Target, name: &str, le
     let settings = Settings::load(&place.station)?;
     let progress = |done: usize, of: usize| this.progress(done, Some(of));
     if target == Target::Camera {
-        let options =
-            CameraOptions { working_distance_mm: settings.volume().map(|v| v.middle()), ..CameraOptions::default() };
+        let options = CameraOptions { asked: asked(&settings, None), ..CameraOptions::default() };
         let result = camera(&[recording], &options, &|done, of| this.progress(done, Some(of)))?;
         let page = page(&result, &format!("Camera calibration of {}", settings.name));
         return keep(this, &result.calibration, &page, result.left_out);
