@@ -9,7 +9,7 @@ VENV := .venv
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 export XDG_RUNTIME_DIR ?= $(shell mktemp -d /tmp/sheetlight-run.XXXXXX)
 
-.PHONY: station browser demo pages lint test bench bench-peers vulkan python notebooks cameras build clean
+.PHONY: station browser demo pages book lint test bench bench-peers vulkan python notebooks cameras build clean
 
 demo: vulkan build
 	$(TARGET)/release/sheetlight demo --out demo
@@ -30,7 +30,11 @@ test: vulkan python cameras browser lint
 pages:
 	tools/pages.sh
 
-lint: pages
+# The documents as a book with search: target/book/index.html.
+book:
+	CARGO="$(CARGO)" tools/book.sh
+
+lint: pages book
 	if $(CARGO) clippy --version >/dev/null 2>&1; then \
 		$(CARGO) clippy --locked --package sheetlight --package shader-twin --all-targets -- -D warnings; \
 	else echo "clippy is not installed: skipped"; fi
