@@ -41,7 +41,7 @@ pub fn left<'a>(before: &'a HeightMap, after: &'a HeightMap) -> impl Fn(&glam::V
 /// Writes the filtered scan. Its map has the grid of the original, so that both can be compared cell by cell.
 ///
 /// # Errors
-/// `scan` holds no scan, `out` holds an unfiltered one, or the filters leave fewer than [`FEWEST`] points.
+/// `scan` holds no scan, `out` holds an unfiltered one, or the filters leave fewer than `FEWEST` points.
 pub fn filter_scan(scan: &Path, filters: &[Filter], out: &Path) -> Result<ScanReport> {
     if filters.is_empty() {
         return Err(Fault::usage("no filter was given").next("give one, for example islands:20,0.5"));
