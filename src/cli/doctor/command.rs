@@ -34,12 +34,12 @@ struct Findings {
     program: String,
     adapters: Vec<AdapterInfo>,
     used: Option<String>,
-    /// Its stages read arrays as texels.
+    /// The adapter's stages read arrays as texels.
     reads_texels: bool,
     no_device_because: Option<String>,
     stages: Vec<StageFinding>,
     rates: Option<Rates>,
-    /// The whole chain on this machine's processor, and on the adapter.
+    /// Times of the whole chain on this machine's processor and on the adapter.
     ways: Vec<WayTime>,
     verdict: String,
 }
@@ -75,7 +75,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
 }
 
 impl Findings {
-    /// Notes what was tried, and says it.
+    /// Stores the result of a trial and reports it.
     fn take(&mut self, event: Event, console: &Console) {
         match event {
             Event::Device { name, reads_texels } if self.used.is_none() => {
