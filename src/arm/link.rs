@@ -15,7 +15,7 @@ pub trait PoseSource: Send {
     fn pose(&mut self) -> Result<TimedPose>;
 }
 
-/// Stops the arm, from any thread, while a motion is under way on the link that it came from.
+/// Stops the arm, from any thread, while a motion is being executed over the link from which it was opened.
 pub trait Halt: Send + Sync {
     /// Returns when the controller has accepted the order. Errors: the controller could not be reached or refused;
     /// look at the robot.

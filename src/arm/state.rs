@@ -56,7 +56,7 @@ pub enum Mode {
     Teach,
     /// Programs.
     Automatic,
-    /// The link does not say.
+    /// The link does not report it.
     Unknown,
 }
 

@@ -111,7 +111,7 @@ impl Switchboard {
     /// Switches both lasers off after some work; if that fails too, the work's fault reports both.
     ///
     /// # Errors
-    /// The work's, and those of [`Switchboard::dark`].
+    /// Those of the work, and those of [`Switchboard::dark`].
     pub fn after<T>(&mut self, done: Result<T>) -> Result<T> {
         match (done, self.dark()) {
             (done, Ok(())) => done,

@@ -1,4 +1,4 @@
-//! In: a URI that names a robot's controller. Out: the link.
+//! In: a URI that names a robot's controller. Out: the link to it.
 //! Frame and unit: none.
 
 use super::{Arm, denso, file, ur};

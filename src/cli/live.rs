@@ -128,7 +128,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     ended.map_or(Ok(()), Err::<(), Fault>)
 }
 
-/// Median and 99th percentile.
+/// Median and 99th percentile of the delays.
 fn delays(waits: &Delays) -> String {
     waits.so_far().map_or("none".into(), |d| d.to_string())
 }

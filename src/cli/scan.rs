@@ -245,7 +245,7 @@ fn no_ambient(fault: Fault) -> Fault {
         .next("take one picture with the laser off and nothing else changed")
 }
 
-/// What `--json` prints with `--truth`.
+/// The output of `--json` with `--truth`.
 #[derive(serde::Serialize)]
 struct WithErrors {
     #[serde(flatten)]

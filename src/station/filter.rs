@@ -99,7 +99,7 @@ pub fn filter_scan(scan: &Path, filters: &[Filter], out: &Path) -> Result<ScanRe
     Ok(report)
 }
 
-/// The frame's name as a cloud's header has it.
+/// The frame's name for a cloud's header.
 fn frame(report: &ScanReport) -> Result<&'static str> {
     let known = ["base", "axis", "flange", "map"].into_iter().find(|f| *f == report.frame);
     known.ok_or_else(|| Fault::input(format!("the scan's frame is {:?}", report.frame)).next("scan again"))

@@ -1,5 +1,5 @@
-//! In: a scan folder, a recipe, the station that scanned. Out: the insertion's report and its picture;
-//! a scan taken with another calibration than the station's is refused.
+//! In: a scan folder, a recipe, the station that made the scan. Out: the insertion's report and its picture. A scan
+//! that was made with another calibration than the station's is refused.
 //! Frame and unit: the scan's frame, mm; plans of a verification scan: base.
 
 use super::height_witness::height_witness;
@@ -204,7 +204,7 @@ pub(super) fn fits(rig: &Rig, scan: &Path, scanned: &ScanReport) -> Result<()> {
     .next("scan again with the present calibration, or give the station that scanned"))
 }
 
-/// Teaches a part from a finished scan: the recipe, its proof on that scan, and a picture of it.
+/// Teaches a part from a finished scan: the recipe, its test on that scan, and a picture of it.
 pub fn teach_part(scan: &Path, options: &TeachOptions) -> Result<(Recipe, Report, RgbImage)> {
     taught(&lit_cloud_of(scan)?, &shots_of(scan)?, options).map_err(|e| e.at(scan.display()))
 }

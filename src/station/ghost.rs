@@ -18,7 +18,7 @@ const MOST_PIECES: f64 = 400.0;
 /// The fields of a `find` report that are needed to draw the part.
 #[derive(Clone, Debug, serde::Deserialize)]
 pub struct Lies {
-    /// Name of the recipe that was looked for.
+    /// Name of the recipe of the search.
     pub recipe: String,
     /// Frame of the pose.
     pub frame: String,

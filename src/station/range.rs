@@ -20,7 +20,7 @@ const FORGIVEN_PX: f64 = 1.0;
 /// a normal profile cut off, the mean of the rest lies at 1.75.
 const CUT: f64 = 2.0;
 
-/// How [`measure_range`] is run.
+/// Options of [`measure_range`].
 #[derive(Clone, Debug)]
 pub struct RangeRun {
     /// How the spot is found in the pictures.
@@ -121,7 +121,7 @@ pub struct Square {
     pub base_from_flange: Rigid<Base, Flange>,
 }
 
-/// What [`measure_range`] found.
+/// Result of [`measure_range`].
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct RangeReport {
     /// One per picture whose spot was measured, in the recording's order.

@@ -48,7 +48,7 @@ pub struct CalibrationCheck {
     pub verification: BTreeMap<String, f64>,
 }
 
-/// What [`verify`] found.
+/// Result of [`verify`].
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct VerifyReport {
     /// Checks by name of the calibration, e.g. "laser plane".

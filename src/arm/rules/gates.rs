@@ -19,9 +19,9 @@ pub struct Situation {
     pub at: Rigid<Base, Flange>,
     /// Its figure, if the controller reports one.
     pub figure: Option<i32>,
-    /// It may be moved: `--allow-motion` was given and it was armed.
+    /// Motion is permitted: `--allow-motion` was given and the robot was armed.
     pub armed: bool,
-    /// A motion was stopped and nobody has looked at the robot since.
+    /// A motion was stopped and no person has looked at the robot since.
     pub unknown: bool,
 }
 

@@ -70,7 +70,7 @@ pub struct Limits {
     /// described.
     #[serde(default = "turning")]
     pub max_turn_deg_s: f64,
-    /// Largest angle between the flange's axis and the measured normal, where one was measured, degrees, 0.1 to 60.
+    /// Largest angle between the flange's axis and the measured normal, if one was measured, degrees, 0.1 to 60.
     #[serde(default = "tilt")]
     pub max_tilt_deg: f64,
     /// Greatest age of a scan that a motion is based on, s, 1 to 86400.
@@ -117,7 +117,7 @@ fn still() -> f64 {
 }
 
 impl Limits {
-    /// The usual limits within a space.
+    /// The default limits within a space.
     pub fn within(workspace: Space) -> Limits {
         Limits {
             workspace,

@@ -6,7 +6,7 @@ use super::plan::Proposal;
 use crate::fault::Result;
 use std::path::{Path, PathBuf};
 
-/// The log of a robot's motions; lines are only ever added.
+/// The log of a robot's motions; lines are only appended.
 #[derive(Clone, Debug, Default)]
 pub struct MotionLog {
     path: Option<PathBuf>,

@@ -26,7 +26,7 @@ pub struct Evidence {
 pub struct Plan {
     /// One or two words.
     pub name: String,
-    /// Why, in a sentence.
+    /// The reason, in one sentence.
     pub why: String,
     /// The legs in order; each begins where the one before ends.
     pub legs: Vec<Motion>,

@@ -16,7 +16,7 @@ pub const START: Duration = Duration::from_millis(1000);
 pub struct Leg {
     /// Target pose.
     pub to: Rigid<Base, Flange>,
-    /// When it was ordered.
+    /// Time of the order.
     pub ordered: Instant,
 }
 

@@ -41,7 +41,7 @@ pub struct Confirmed {
     pub simulated: bool,
 }
 
-/// What a watch shares with the motion that it watches.
+/// The state that a watch shares with its motion.
 pub struct Watch<'a> {
     pub limits: &'a Limits,
     pub carried: &'a Carried,

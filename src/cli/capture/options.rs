@@ -248,7 +248,7 @@ pub struct Teller {
 const EVERY: Duration = Duration::from_secs(1);
 
 impl Teller {
-    /// Takes in news, and the account once a second.
+    /// Takes in a message of the stream, and the account once a second.
     pub fn hear(&mut self, stream: &Stream, said: Option<String>) {
         if let Some(said) = said {
             self.news.lock().unwrap_or_else(PoisonError::into_inner).push(said);

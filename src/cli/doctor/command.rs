@@ -1,5 +1,5 @@
-//! In: this machine. Out: its adapters, every stage compared with its CPU twin, transfer rates, the time of a shot,
-//! and a plain verdict, each as soon as it is known.
+//! In: this machine. Out: its adapters, every stage compared with its CPU counterpart, transfer rates, the time of
+//! a shot, and a verdict; each is printed as soon as it is known.
 //! Frame and unit: words that differ, or the stage's own measure; GB/s, ms.
 
 use super::trial;

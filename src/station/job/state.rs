@@ -70,7 +70,7 @@ pub struct JobState {
     /// The shifts of the sweep, one for each time that the part extended beyond the scan's edge; base frame, mm.
     #[serde(default)]
     pub moved_mm: Vec<Vec3>,
-    /// When the scan was finished, s since 1970.
+    /// Time of the end of the scan, s since 1970.
     pub scanned_at: Option<f64>,
     /// Flange poses of approach, insertion and retract.
     pub poses: Option<[Rigid<Base, Flange>; 3]>,
@@ -174,7 +174,7 @@ impl JobState {
     /// any.
     ///
     /// # Errors
-    /// Another recipe or other calibrations.
+    /// The job was begun with another recipe or other calibrations.
     pub fn goes_on_with(&self, made_from: &str) -> Result<()> {
         let way_up = matches!(self.resumes(), Resumes::Up | Resumes::Over);
         if way_up || self.made_from == made_from {

@@ -71,14 +71,14 @@ pub struct Sweep {
     pub figures: SweepFigures,
 }
 
-/// A sweep in numbers.
+/// The figures of a sweep.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct SweepFigures {
-    /// From the board to the camera, mm.
+    /// Distance from the board to the camera, mm.
     pub depth_mm: f64,
-    /// From the first shot's stripe to the last one's, mm.
+    /// Distance from the first shot's stripe to the last one's, mm.
     pub length_mm: f64,
-    /// From one shot to the next, mm.
+    /// Distance between shots, mm.
     pub step_mm: f64,
     /// Number of pictures.
     pub shots: usize,

@@ -27,7 +27,7 @@ const AGAIN: f64 = 0.5;
 struct Around {
     /// In the camera's frame at its first pose, mm.
     middle: Vec3,
-    /// Share of the first touches' spread.
+    /// Spread of the touches as a share of the first ones' spread.
     spread: f64,
     /// Name of the plan and of the folder of the pictures.
     name: &'static str,

@@ -12,8 +12,8 @@ use std::path::Path;
 
 const HISTOGRAM_BINS: usize = 21;
 
-/// Compares a scan folder with `truth.json` and writes `errors.json`, `error_picture.png` and a new
-/// page, which shows the `found` parts too, into it.
+/// Compares a scan folder with `truth.json`. Writes `errors.json`, `error_picture.png` and a new page into it; the
+/// page also shows the `found` parts.
 pub fn judge(scan: &Path, truth: &Path, found: &[FoundPart]) -> Result<Judged> {
     let truth = Truth::load(truth)?;
     let cloud = CloudFile::open(&scan.join("cloud.ply"))?;

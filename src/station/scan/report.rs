@@ -72,7 +72,7 @@ pub struct ScanReport {
     /// Number of hot pixels of the sensor; they were replaced by their neighbours.
     #[serde(default)]
     pub hot_pixels: usize,
-    /// Levels of the pictures and where their light lies.
+    /// Levels of the pictures and the area of their light.
     pub seen: Seen,
     /// Duration from the first shot to the closed cloud, s.
     pub seconds: f64,
@@ -96,7 +96,7 @@ pub struct ScanReport {
     pub filtered: Option<Filtered>,
 }
 
-/// Which scan was filtered, and how.
+/// The scan that was filtered, and the filters.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Filtered {
@@ -110,7 +110,7 @@ pub struct Filtered {
     pub cells: Vec<usize>,
 }
 
-/// What an imported file was, and what its user stated about it.
+/// An imported file, and what its user stated about it.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Imported {
@@ -124,7 +124,7 @@ pub struct Imported {
     /// SHA-256 of the intensity picture that belongs to it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub light_sha256: Option<String>,
-    /// mm in one level or coordinate, as stated.
+    /// Length of one level or one coordinate unit, mm, as stated.
     pub unit_mm: f64,
     /// Distance of columns and rows, as stated, mm.
     pub spacing_mm: Option<[f64; 2]>,

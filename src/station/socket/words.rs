@@ -42,7 +42,7 @@ pub enum Which {
 /// What a pose belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Of {
-    /// The inserting tool, which the controller has selected.
+    /// The inserting tool that the controller has selected.
     Tool,
     /// The flange: tool 0.
     Flange,

@@ -116,7 +116,7 @@ impl Sigmas {
 
 /// Largest sigma that a calibration may have, mm, degrees or px.
 const MOST: f64 = 10.0;
-/// A camera on an arm works nearer than this, mm.
+/// Largest working distance of a camera on an arm, mm.
 const FARTHEST: f64 = 5000.0;
 
 /// The remark that every report contains.

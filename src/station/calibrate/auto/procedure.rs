@@ -59,7 +59,7 @@ struct Session<'a> {
     /// Largest tilt that is requested, degrees: it grows while the predictions are right.
     tilt_deg: f64,
     tries: u64,
-    /// Stops in a row at which the board was not found where it was predicted.
+    /// Number of stops in a row at which the board was not found where it was predicted.
     lost: usize,
     /// Poses that the arm came by, the first pose first.
     trail: Vec<Rigid<Base, Flange>>,
@@ -341,7 +341,7 @@ enum Visit {
     Seen(usize),
     /// The board was not seen; the reason in words.
     Lost(String),
-    /// The arm did not go.
+    /// The arm did not go; the reason in words.
     NotBegun(String),
 }
 

@@ -23,14 +23,14 @@ pub struct Picture {
     pub file: String,
 }
 
-/// Pictures taken without moving.
+/// Pictures that were taken at one standstill.
 #[derive(Clone, Debug)]
 pub struct Stop {
     /// Its name in messages: the picture in room light, with its recording if there are several.
     pub name: String,
-    /// As meta.json describes it.
+    /// The board as meta.json describes it.
     pub board: BoardSpec,
-    /// Its features in room light.
+    /// The board's features in room light.
     pub view: BoardView,
     /// The robot's reported pose, and the index of the board position that it saw.
     pub robot: Option<Reported>,
