@@ -1,4 +1,4 @@
-//! In: a pose file. Out: its poses one after the other, as a robot that was led from one to the next by hand.
+//! In: a pose file. Out: its poses one after the other, as if the robot was led by hand from each to the next.
 //! Frame and unit: base_from_flange, mm.
 
 use super::{Arm, Mode, PoseSource, State, TimedPose};
@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// Poses that were written down. All readers of one file go through it together.
+/// Poses that were read from a file. All readers of one file share one position in it.
 #[derive(Clone)]
 pub(super) struct PosesOfFile {
     name: String,

@@ -1,4 +1,4 @@
-//! In: questions and allowed motions. Out: what every link to a robot answers.
+//! In: queries and allowed motions. Out: the interface of every link to a robot.
 //! Frame and unit: base_from_flange, mm; times of this machine's monotonic clock.
 
 use super::{Allowed, Reach, State, TimedPose};
@@ -6,83 +6,83 @@ use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use std::sync::Arc;
 
-/// The variable that only a simulated controller has, and what it holds: so a link knows it, whatever its address.
+/// A variable that only a simulated controller has, and its content: it identifies a simulated one at any address.
 pub const SIMULATED: [&str; 2] = ["@SIMULATED_BY", "sheetlight cell"];
 
-/// Something that says where a flange is. Each has a connection of its own, so that one can be read while the arm
-/// moves.
+/// A source of flange poses. Each has a separate connection, so that it can be read while the arm moves.
 pub trait PoseSource: Send {
-    /// The pose now; for poses from a file the next one.
+    /// The current pose; for poses from a file the next one.
     fn pose(&mut self) -> Result<TimedPose>;
 }
 
-/// Stops the arm, from any thread, while a motion is under way on the link that it came from.
+/// Stops the arm, from any thread, while a motion is being executed over the link from which it was opened.
 pub trait Halt: Send + Sync {
-    /// Returns when the controller has taken the order. Errors: it could not be told; look at the robot.
+    /// Returns when the controller has accepted the order. Errors: the controller could not be reached or refused;
+    /// look at the robot.
     fn halt(&self) -> Result<()>;
 }
 
-/// Switches outputs of a controller over a connection of its own: neither a motion nor a link that was cut is in its
-/// way.
+/// Switches outputs of a controller over a separate connection, so that neither a motion nor a broken link blocks
+/// it.
 pub trait Switch: Send {
-    /// Returns when the controller has taken the order. Errors: it could not be told, or it refused; nobody knows then
-    /// what is on.
+    /// Returns when the controller has accepted the order. Errors: the controller could not be reached, or it
+    /// refused; the state of the outputs is then unknown.
     fn put(&mut self, number: u16, on: bool) -> Result<()>;
 
-    /// What the controller says of an output. Errors: it does not answer, or refuses.
+    /// The state that the controller reports for an output. Errors: it does not answer, or refuses.
     fn is_on(&mut self, number: u16) -> Result<bool>;
 }
 
-/// A robot on a wire. Reading is always possible; what changes the world is refused by links that only read.
+/// A robot on a wire. Reading is always possible; links that only read refuse everything else.
 pub trait Arm: PoseSource {
-    /// The URI that it was opened with.
+    /// The URI with which it was opened.
     fn name(&self) -> &str;
 
     /// Mode, motor, errors, frames.
     fn state(&mut self) -> Result<State>;
 
-    /// The controller says that it is a simulated one. An address says nothing: a tunnel to a real one begins on this
-    /// machine too.
+    /// Whether the controller reports that it is simulated. The address does not show it: a tunnel to a real
+    /// controller also begins on this machine.
     fn simulated(&mut self) -> Result<bool> {
         Ok(false)
     }
 
-    /// What people take for granted and the controller does not say, in words.
+    /// A usual assumption that the controller does not confirm, in words.
     fn unsaid(&self) -> Option<&'static str> {
         None
     }
 
-    /// A second reader of poses over a connection of its own.
+    /// A second reader of poses over a separate connection.
     fn watch(&self) -> Result<Box<dyn PoseSource>>;
 
-    /// What stops it, over a connection that no motion blocks. Errors: a link that cannot move anything.
+    /// What stops the arm, over a connection that no motion blocks. Errors: the link cannot move anything.
     fn stop(&self) -> Result<Arc<dyn Halt>> {
         Err(reads_only(self.name()))
     }
 
-    /// Whether the controller would go there: reach and virtual fence.
+    /// Whether the controller can go there: reach and virtual fence.
     fn reach(&mut self, _to: &Rigid<Base, Flange>) -> Result<Reach> {
         Ok(Reach::Unasked)
     }
 
-    /// Takes the arm, so that no other program moves it; tool and work frame are 0 from then on.
+    /// Takes control of the arm, so that no other program moves it; sets tool and work frame to 0.
     fn take(&mut self) -> Result<()> {
         Err(reads_only(self.name()))
     }
 
-    /// Gives the arm back.
+    /// Returns control of the arm.
     fn give(&mut self) -> Result<()> {
         Ok(())
     }
 
-    /// Makes one motion and returns when it has ended. Errors: it was not begun, or was stopped; the pose has to be
-    /// read again. Of kind [`crate::fault::Kind::Refused`] where the controller answered with an error, of another
-    /// where nobody knows what it did.
+    /// Executes one motion and returns when it has ended. Errors: it was not begun, or was stopped; the pose has to
+    /// be read again. The kind is [`crate::fault::Kind::Refused`] if the controller answered with an error, and
+    /// another one if the controller's action is unknown.
     fn make(&mut self, _allowed: Allowed) -> Result<()> {
         Err(reads_only(self.name()))
     }
 
-    /// What switches outputs of the controller (lasers, lamp, gripper). Errors: a link that switches nothing.
+    /// A switch for outputs of the controller (lasers, lamp, gripper). Errors: the link switches nothing.
     fn switch(&self) -> Result<Box<dyn Switch>> {
         Err(reads_only(self.name()))
     }

@@ -1,5 +1,5 @@
-//! In: where a robot's controller is (a URI). Out: its state, its pose with the time it was read, moves that were
-//! allowed. One trait for all links; a link that only reads is never armed.
+//! In: the address of a robot's controller (a URI). Out: its state, its pose with the time it was read, execution
+//! of allowed motions. One trait for all links; a link that only reads is never armed.
 //! Frame and unit: poses base_from_flange; mm, radians; speeds mm/s.
 
 mod denso;

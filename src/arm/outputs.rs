@@ -1,7 +1,7 @@
-//! In: the table `[outputs]` of station.toml. Out: which output of the controller switches what.
-//! Frame and unit: numbers of outputs as the controller counts them.
+//! In: the table `[outputs]` of station.toml. Out: the number of the controller's output for each device.
+//! Frame and unit: output numbers as the controller counts them.
 
-/// Numbers of the controller's outputs and what hangs on them.
+/// Numbers of the controller's outputs for the devices of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Outputs {
@@ -11,7 +11,7 @@ pub struct Outputs {
     pub pointer: u16,
     /// The room's lamp.
     pub room: u16,
-    /// The gripper: on is closed.
+    /// The gripper: on closes it.
     pub gripper: u16,
 }
 

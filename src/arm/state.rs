@@ -1,40 +1,42 @@
-//! In: what a controller says of itself. Out: the same in one form for all makes.
+//! In: what a controller reports about itself. Out: the same in one form for all makes.
 //! Frame and unit: poses base_from_flange, mm; times of this machine's monotonic clock.
 
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use std::time::{Duration, Instant};
 
-/// A pose and when it was true.
+/// A pose and the time at which it was true.
 #[derive(Clone, Copy, Debug)]
 pub struct TimedPose {
-    /// Where the flange stood, mm.
+    /// Pose of the flange, mm.
     pub base_from_flange: Rigid<Base, Flange>,
-    /// Configuration of arm, elbow and wrist as the controller numbers it, where it does.
+    /// Configuration of arm, elbow and wrist in the controller's own numbering; `None` if the controller reports
+    /// none.
     pub figure: Option<i32>,
-    /// When the pose was asked for: it is not older than that.
+    /// When the pose was requested: it is not older than that.
     pub asked: Instant,
-    /// When it was here: it is not younger than that.
+    /// When the answer arrived: the pose is not younger than that.
     pub here: Instant,
-    /// The controller's own clock when it read its joints, where it says so; counts from an unknown start.
+    /// The controller's own clock when it read its joints, if it reports it; counts from an unknown start.
     pub device: Option<Duration>,
 }
 
 impl TimedPose {
-    /// The best guess of the moment on this machine's clock, good to half of the round trip on either side.
+    /// The best estimate of the pose's time on this machine's clock, good to half of the round trip on either side.
     pub fn moment(&self) -> Instant {
         self.asked + self.round_trip() / 2
     }
-    /// From the question to the answer.
+    /// The time from the request to the answer.
     pub fn round_trip(&self) -> Duration {
         self.here.saturating_duration_since(self.asked)
     }
 }
 
-/// Longest time that a controller's clock is believed to have counted, s: thirty thousand years.
+/// The largest time stamp of a controller that is accepted, s: thirty thousand years.
 const LONGEST_S: f64 = 1e12;
 
-/// The controller's stamp of a pose. Errors: no number, or one that no clock shows: the link is lost.
+/// The controller's time stamp of a pose. Errors: the stamp is not a number, or it is outside 0 to [`LONGEST_S`];
+/// the fault counts as a lost link.
 pub(super) fn stamp(seconds: f64) -> Result<Duration> {
     let believed = Duration::try_from_secs_f64(seconds).ok().filter(|_| seconds <= LONGEST_S);
     believed.ok_or_else(|| {
@@ -54,48 +56,48 @@ pub enum Mode {
     Teach,
     /// Programs.
     Automatic,
-    /// The link does not say.
+    /// The link does not report it.
     Unknown,
 }
 
-/// An error that stands on the controller.
+/// An error that is active on the controller.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct ControllerError {
     /// Its number.
     pub code: u32,
-    /// The controller's own words, in its language; control characters taken out.
+    /// The controller's own words, in its language, without control characters.
     pub text: String,
 }
 
-/// What decides whether the arm may be moved.
+/// The state that decides whether the arm may be moved.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     /// The arm's type as the controller names it.
     pub model: String,
     /// Who may move it.
     pub mode: Mode,
-    /// The motors have power; `None`: not said.
+    /// The motors have power; `None`: not reported.
     pub motor: Option<bool>,
-    /// It moves now, or a program runs; `None`: not said.
+    /// It moves now, or a program runs; `None`: not reported.
     pub busy: Option<bool>,
-    /// The emergency stop is pressed; `None`: not said.
+    /// The emergency stop is pressed; `None`: not reported.
     pub emergency_stop: Option<bool>,
-    /// Errors that stand.
+    /// Active errors.
     pub errors: Vec<ControllerError>,
-    /// Number of the tool whose pose is reported; 0 is the flange; `None`: not said.
+    /// Number of the tool whose pose is reported; 0 is the flange; `None`: not reported.
     pub tool: Option<i32>,
-    /// Number of the work frame in which it is reported; 0 is the base; `None`: not said.
+    /// Number of the work frame in which the pose is reported; 0 is the base; `None`: not reported.
     pub work: Option<i32>,
 }
 
-/// Whether a pose can be reached, as the controller sees it.
+/// Whether the controller can reach a pose.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reach {
-    /// It can.
+    /// The controller can reach it.
     Free,
-    /// It cannot; in words.
+    /// The controller cannot reach it; the reason in words.
     Refused(String),
-    /// The link cannot ask.
+    /// The link cannot ask the controller.
     Unasked,
 }
 

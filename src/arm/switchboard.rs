@@ -1,4 +1,4 @@
-//! The outputs of a cell in one hand: whoever holds them lights the lasers, and the lasers go off when they are let go.
+//! The outputs of a cell with one owner: the owner switches the lasers, and they go off when it is dropped.
 
 use super::{Arm, Outputs, Switch};
 use crate::fault::{Fault, Kind, Result};
@@ -7,28 +7,27 @@ use std::io::Write;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// While something is done with a laser on, the controller is asked this often whether it is still there.
+/// Interval at which the controller is asked for an answer while work is done with a laser on.
 const ASKED: Duration = Duration::from_millis(100);
 
-/// Lasers, lamp and gripper. Dropped, on whatever way, it switches the lasers off. The gripper stays as it is: what it
-/// holds would
-/// fall; so does the lamp.
+/// Lasers, lamp and gripper. Dropping it, on whatever path, switches the lasers off. The gripper is not changed,
+/// because what it holds would fall; the lamp is not changed either.
 pub struct Switchboard {
     switch: Box<dyn Switch>,
     outputs: Outputs,
-    /// What pictures are lit by; none where the lamp may be anyhow.
+    /// Light of the pictures; `None` if the lamp may be in any state.
     light: Option<Option<Beam>>,
     /// A laser may be on.
     burns: bool,
-    /// Whoever holds it was told that a laser may still be on.
+    /// The owner was informed that a laser may still be on.
     told: bool,
 }
 
 impl Switchboard {
-    /// Takes the outputs of an arm's controller. What a program that was killed left lit goes off first.
+    /// Takes the outputs of an arm's controller. First it switches off what a killed program left on.
     ///
     /// # Errors
-    /// A link that switches nothing; the controller is not reached, or refuses.
+    /// The link switches nothing, or the controller is not reached, or it refuses.
     pub fn of(arm: &dyn Arm, outputs: Outputs) -> Result<Switchboard> {
         let mut taken = Switchboard { switch: arm.switch()?, outputs, light: None, burns: true, told: false };
         taken.dark()?;
@@ -48,24 +47,24 @@ impl Switchboard {
         Ok(())
     }
 
-    /// Does something with one laser on, the lamp as it is; the laser is off when this returns, whatever came of it.
-    /// Where the controller is not reached meanwhile, the laser goes off as soon as it is reached again.
+    /// Does something with one laser on, without changing the lamp. The laser is off when this returns, whatever
+    /// the outcome. If the controller is not reached meanwhile, the laser goes off as soon as it is reached again.
     ///
     /// # Errors
-    /// Those of the work, and of [`Switchboard::after`]; the controller was not reached meanwhile.
+    /// Those of the work and of [`Switchboard::after`]; the controller was not reached meanwhile.
     pub fn lit<T>(&mut self, beam: Beam, work: impl FnOnce() -> Result<T>) -> Result<T> {
         let done = self.burn(beam).and_then(|()| self.watched(work));
         self.after(done)
     }
 
-    /// Does the work while another thread asks the controller again and again.
+    /// Does the work while another thread asks the controller at intervals.
     fn watched<T>(&mut self, work: impl FnOnce() -> Result<T>) -> Result<T> {
         let (goes_on, over) = channel();
         std::thread::scope(|threads| {
             let watch = std::thread::Builder::new().name("laser".into());
             let watch = watch.spawn_scoped(threads, move || self.watch(&over));
             let watch = watch.map_err(|e| Fault::threads(&e))?;
-            // Dropped where the work panics, too: then the watch ends.
+            // Also dropped if the work panics: then the watch ends.
             let goes_on = goes_on;
             let done = work();
             drop(goes_on);
@@ -79,20 +78,20 @@ impl Switchboard {
         })
     }
 
-    /// Until the work is over; why the controller was not reached meanwhile.
+    /// Watches until the work is over; returns the reason if the controller was not reached meanwhile.
     fn watch(&mut self, over: &Receiver<()>) -> Option<Fault> {
         let mut lost = None;
         while over.recv_timeout(ASKED) == Err(RecvTimeoutError::Timeout) {
             lost = lost.or_else(|| self.switch.is_on(self.outputs.line).err());
             if lost.is_some() && self.burns {
-                // Tried again until it succeeds; the hand that lets go says it where it never does.
+                // Repeated until it succeeds; if it never does, [`Switchboard::after`] reports it.
                 let _ = self.off();
             }
         }
         lost
     }
 
-    /// Both lasers off, the lamp as it is.
+    /// Switches both lasers off without changing the lamp.
     ///
     /// # Errors
     /// A laser may still be on: the controller was not reached, or refused.
@@ -109,10 +108,10 @@ impl Switchboard {
         })
     }
 
-    /// Both lasers off after some work; where that fails too, the work's fault says both.
+    /// Switches both lasers off after some work; if that fails too, the work's fault reports both.
     ///
     /// # Errors
-    /// The work's, and those of [`Switchboard::dark`].
+    /// Those of the work, and those of [`Switchboard::dark`].
     pub fn after<T>(&mut self, done: Result<T>) -> Result<T> {
         match (done, self.dark()) {
             (done, Ok(())) => done,
@@ -125,26 +124,26 @@ impl Switchboard {
         }
     }
 
-    /// The room's lamp.
+    /// Switches the room's lamp.
     pub fn lamp(&mut self, on: bool) -> Result<()> {
         self.light = None;
         self.switch.put(self.outputs.room, on)
     }
 
-    /// Closes the gripper, or opens it, which drops its component.
+    /// Closes the gripper, or opens it, which drops the component.
     pub fn grip(&mut self, closed: bool) -> Result<()> {
         self.switch.put(self.outputs.gripper, closed)
     }
 
-    /// One laser on and the other off, the lamp as it is.
+    /// Switches one laser on and the other off without changing the lamp.
     fn burn(&mut self, beam: Beam) -> Result<()> {
         (self.light, self.burns) = (None, true);
         self.switch.put(self.outputs.line, beam == Beam::Line)?;
         self.switch.put(self.outputs.pointer, beam == Beam::Pointer)
     }
 
-    /// Tells both lasers, also where the controller refuses the first; where it is not reached the second would wait
-    /// in vain.
+    /// Switches off both lasers, also if the controller refuses the first. If it is not reached, the second is not
+    /// tried: it would only wait.
     fn off(&mut self) -> Result<()> {
         self.light = None;
         let line = self.switch.put(self.outputs.line, false);
@@ -163,7 +162,7 @@ impl Drop for Switchboard {
         if let Err(fault) = self.dark()
             && !told
         {
-            // The output may be closed: a destructor must not panic for that.
+            // Standard error may be closed: a destructor must not panic for that.
             let _ = writeln!(std::io::stderr(), "{fault}");
         }
     }

@@ -1,7 +1,7 @@
-//! In: the address of a Universal Robots controller. Out: its poses, from the real-time interface (port 30003) that
-//! it streams by itself; it is read, nothing is sent.
-//! Frame and unit: metres and rotation vector on the wire, base_from_flange in mm here: the tool centre point must be
-//! the flange.
+//! In: the address of a Universal Robots controller. Out: its poses, read from the stream of its real-time
+//! interface (port 30003); nothing is sent.
+//! Frame and unit: metres and rotation vector on the wire, base_from_flange in mm here: the tool centre point must
+//! be the flange.
 
 use super::state::stamp;
 use super::{Arm, Mode, PoseSource, State, TimedPose};
@@ -12,10 +12,10 @@ use std::net::{TcpStream, ToSocketAddrs};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Longest silence of a stream that comes 125 or 500 times a second.
+/// Longest silence of a stream that sends 125 or 500 packets a second.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Where a packet has its time, its tool vector and its robot mode (big-endian doubles); packets of all controllers
-/// since version 3 begin alike and have so many bytes at least.
+/// Byte offsets of time and tool vector in a packet (big-endian doubles), and the limits of its length, bytes.
+/// Packets of all controllers since version 3 begin alike and are at least `SHORTEST` long.
 const TIME: usize = 4;
 const TOOL: usize = 444;
 const SHORTEST: usize = 812;
@@ -30,7 +30,7 @@ pub struct Packet {
     pub tool: [f64; 6],
 }
 
-/// Reads one packet, its length included. Errors: too short for what has to be in it.
+/// Reads one packet, its length field included. Errors: the packet is shorter than `SHORTEST`.
 pub fn packet(bytes: &[u8]) -> Result<Packet> {
     if bytes.len() < SHORTEST {
         return Err(Fault::input(format!("a packet of {} bytes, {SHORTEST} or more are expected", bytes.len()))
@@ -43,7 +43,7 @@ pub fn packet(bytes: &[u8]) -> Result<Packet> {
 
 #[derive(Default)]
 struct Newest {
-    /// How many came, the newest one and when it was here.
+    /// Number of packets so far, the newest one with the time of its arrival, and the fault that ended the stream.
     packet: Mutex<(u64, Option<(Packet, Instant)>, Option<Fault>)>,
     came: Condvar,
 }
@@ -110,7 +110,7 @@ fn read(stream: &mut TcpStream) -> Result<Packet> {
 }
 
 impl PoseSource for UrPoses {
-    /// The first pose that came after the question.
+    /// The first pose that arrives after the request.
     fn pose(&mut self) -> Result<TimedPose> {
         let asked = Instant::now();
         let mut held = self.newest.packet.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,4 +1,4 @@
-//! In: a URI that names a robot's controller. Out: the link.
+//! In: a URI that names a robot's controller. Out: the link to it.
 //! Frame and unit: none.
 
 use super::{Arm, denso, file, ur};
@@ -6,7 +6,7 @@ use crate::bcap::Network;
 use crate::fault::{Fault, Result};
 use std::path::PathBuf;
 
-/// Where a robot is.
+/// The address of a robot.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RobotUri {
     /// `bcap://HOST[:PORT][?network=udp][&full=MM_S][&turn=DEG_S]`: a Denso controller; `full` and `turn` are the
@@ -14,27 +14,28 @@ pub enum RobotUri {
     Bcap {
         /// HOST:PORT.
         address: String,
-        /// How motions and reading travel. Halt goes over TCP in any case.
+        /// Network of motions and readings. Halt always goes over TCP.
         network: Network,
         /// Speed of the flange at 100 %, mm/s.
         full_mm_s: f64,
         /// Turning rate of the flange at 100 %, degrees/s.
         full_deg_s: f64,
     },
-    /// `ur://HOST[:PORT]`: poses of a Universal Robots controller, read from its real-time interface: HOST:PORT.
+    /// `ur://HOST[:PORT]`: poses of a Universal Robots controller, read from its real-time interface. Holds
+    /// HOST:PORT.
     Ur(String),
     /// `file:PATH`: poses from a pose file, one for each reading.
     File(PathBuf),
 }
 
-/// The port that b-CAP has on every controller.
+/// The b-CAP port, the same on every controller.
 const BCAP_PORT: u16 = 5007;
 /// The port of Universal Robots' real-time interface.
 const UR_PORT: u16 = 30_003;
-/// Straight motions at 100 %, mm/s. What the VS-060 does is to be measured; a motion that is faster than asked is
-/// halted.
+/// Speed of straight motions at 100 %, mm/s. The VS-060's own value has to be measured; a motion that is faster
+/// than requested is halted.
 const FULL_MM_S: f64 = 1000.0;
-/// The same for turning, degrees/s.
+/// Turning rate of straight motions at 100 %, degrees/s.
 const FULL_DEG_S: f64 = 200.0;
 
 impl std::str::FromStr for RobotUri {
@@ -90,7 +91,7 @@ impl std::str::FromStr for RobotUri {
     }
 }
 
-/// HOST:PORT, the port added where it is missing. IPv6 addresses stand in brackets.
+/// HOST:PORT; the port is added if it is missing. IPv6 addresses are written in brackets.
 fn with_port(host: &str, port: u16) -> std::result::Result<String, String> {
     let name = host.rsplit_once(']').map_or(host, |(_, after)| after);
     match name.rsplit_once(':') {
@@ -100,7 +101,7 @@ fn with_port(host: &str, port: u16) -> std::result::Result<String, String> {
     }
 }
 
-/// Opens the link that a URI names. Errors: a URI that says nothing, a controller that does not answer.
+/// Opens the link that a URI names. Errors: the URI is not valid, or the controller does not answer.
 pub fn open(uri: &str) -> Result<Box<dyn Arm>> {
     Ok(match uri.parse()? {
         RobotUri::Bcap { address, network, full_mm_s, full_deg_s } => {

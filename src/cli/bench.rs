@@ -1,5 +1,5 @@
-//! In: sizes and scenes. Out: a table of speeds of this machine, or a file of it; or the peer's side of a
-//! comparison on stdin and stdout. Frame and unit: ms, shots a second, pixels, GB/s.
+//! In: sizes and scenes. Out: a table of this machine's speeds, or a file of it; or the peer's side of a comparison
+//! on stdin and stdout. Frame and unit: ms, shots/s, pixels, GB/s.
 
 use crate::bench::{self, BenchOptions, KeptUp, Scene, WayTime};
 use crate::cli::terminal::console::Console;
@@ -100,7 +100,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     Ok(())
 }
 
-/// What a shot takes and what of a camera is dropped, here and elsewhere.
+/// Time of a shot and drops of a camera's pictures, here and elsewhere.
 #[derive(serde::Serialize)]
 struct Health {
     kept_up: Vec<KeptUp>,

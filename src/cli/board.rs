@@ -106,7 +106,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     Ok(())
 }
 
-/// The board of the arguments, with what they leave out.
+/// The board of the arguments, with defaults for missing ones.
 fn asked(args: &Args) -> BoardSpec {
     let border_mm = args.border_mm.unwrap_or(0.6 * args.square_mm);
     match args.kind.as_str() {

@@ -1,5 +1,5 @@
-//! In: a scene and a seed. Out: a simulated robot cell that answers on this machine's ports until Ctrl-C: controller,
-//! camera, gripper's camera; what happened, judged by its truth.
+//! In: a scene and a seed. Out: a simulated robot cell that answers on this machine's ports until Ctrl-C:
+//! controller, camera, gripper's camera; its events, judged by its truth.
 //! Frame and unit: base frame, mm, degrees; s of the cell.
 
 use crate::cell::{Cell, CellOptions, Event, Served};
@@ -121,7 +121,7 @@ fn simulate(args: &Args, console: &Console) -> Result<()> {
     let at = |port: u16| format!("127.0.0.1:{port}");
     let gripper_port = if args.camera_port == 0 { 0 } else { args.camera_port.saturating_add(1) };
     let served = Served::start(cell, &at(args.robot_port), &at(args.camera_port), &at(gripper_port))?;
-    // As the operator leaves it: motor on, nothing pending.
+    // The state in which an operator leaves a cell: motor on, no errors.
     served.controller.set_motor(true);
     let (robot, camera, gripper) =
         (served.robot_uri(), served.camera_uri(), format!("cell://{}", served.gripper_camera));
@@ -132,7 +132,7 @@ fn simulate(args: &Args, console: &Console) -> Result<()> {
     follow(&served, args, console)
 }
 
-/// Says what happens until the program is told to end.
+/// Reports events until the program is asked to end.
 fn follow(served: &Served, args: &Args, console: &Console) -> Result<()> {
     let (stop, mut said) = (interrupt::asked_for(), 0);
     while !stop.load(Ordering::Relaxed) {

@@ -1,4 +1,4 @@
-//! In: the words of the command line. Out: the subcommand that was meant, run; its exit code.
+//! In: the arguments of the command line. Out: their subcommand, executed; its exit code.
 //! Frame and unit: none.
 
 use super::capture::{camera, record};
@@ -33,7 +33,7 @@ struct Cli {
     command: Command,
 }
 
-/// The commands as the help lists them.
+/// The commands in the groups of the help.
 const GROUPS: [(&str, &[&str]); 6] = [
     ("Station", &["rig", "station", "verify", "doctor"]),
     ("Calibration", &["board", "calibrate"]),
@@ -43,7 +43,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ("Simulation and measurement", &["demo", "simulate", "cell", "bench"]),
 ];
 
-/// The command line with its commands in groups, which clap itself does not do.
+/// The command line with its commands in groups, which clap does not support directly.
 fn grouped() -> clap::Command {
     let command = Cli::command();
     let mut list = String::new();
@@ -148,7 +148,7 @@ pub fn main() -> u8 {
     let cli = match grouped().try_get_matches().and_then(|m| Cli::from_arg_matches(&m)) {
         Ok(cli) => cli,
         Err(e) => {
-            // Nothing is left to be said when even stderr is closed.
+            // If even stderr is closed, nothing can be reported.
             let _ = e.print();
             return if e.use_stderr() { 2 } else { 0 };
         }
@@ -168,14 +168,14 @@ pub fn main() -> u8 {
 mod tests {
     use super::*;
 
-    /// What a text shows to be typed: its lines, joined where a backslash ends them, from each `sheetlight` on.
+    /// The commands that a text shows: its lines, joined where a backslash ends them, from each `sheetlight` on.
     fn shown(text: &str, mark: &str) -> Vec<String> {
         let joined = text.replace("\\\n", " ");
         let calls = joined.lines().filter_map(|l| l.strip_prefix(mark)).filter_map(|l| l.split_once("sheetlight "));
         calls.map(|(_, c)| c.split(['>', '#']).next().unwrap_or_default().trim().to_owned()).collect()
     }
 
-    /// As a shell splits them: quotes keep blanks.
+    /// The words as a shell splits them: quotes preserve blanks.
     fn words(call: &str) -> Vec<String> {
         let mut all: Vec<String> = Vec::new();
         for (i, part) in call.split('\'').enumerate() {
@@ -219,7 +219,7 @@ mod tests {
                 parses(&call);
                 count += 1;
             }
-            // Within a sentence commands may be shortened, but they name no command or option that is not there.
+            // Within a sentence commands may be shortened, but every named command or option has to exist.
             for call in text.split('`').skip(1).step_by(2).filter_map(|code| code.strip_prefix("sheetlight ")) {
                 let typed = std::iter::once("sheetlight".to_owned()).chain(words(call));
                 let kind = Cli::try_parse_from(typed).err().map(|e| e.kind());
@@ -228,7 +228,7 @@ mod tests {
             }
         }
         assert!(count > 60, "{count} commands in documents");
-        // Every option and argument says what it is.
+        // Every option and argument has a description.
         fn described(command: &clap::Command) {
             for a in command.get_arguments() {
                 assert!(a.get_help().is_some(), "{} {} has no help", command.get_name(), a.get_id());

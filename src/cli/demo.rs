@@ -1,5 +1,5 @@
-//! In: nothing but a folder. Out: a simulated station, its scan through the whole chain, the errors
-//! against the truth, and one page that shows all of it.
+//! In: only a folder. Out: a simulated station, its scan through the whole chain, the errors against the truth, and
+//! one page that shows everything.
 //! Frame and unit: base frame, mm.
 
 use crate::cli::terminal::console::Console;
@@ -36,10 +36,10 @@ pub struct Args {
     on: Where,
 }
 
-/// What the scan is called; a demo replaces no other.
+/// Label of the scan; a demo replaces only scans with this label.
 const LABEL: &str = "a simulated board with parts";
 
-/// The tasks that the simulated board holds the parts of.
+/// The recipes of the parts on the simulated board.
 const RECIPES: [&str; 3] = [
     include_str!("../../data/recipes/led.toml"),
     include_str!("../../data/recipes/osc.toml"),
@@ -79,7 +79,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     Ok(())
 }
 
-/// Simulates the station and a scan: their folders.
+/// Simulates the station; returns the folders of the station and its scan.
 fn simulated(args: &Args, console: &Console) -> Result<(PathBuf, PathBuf)> {
     let options = SimulateOptions {
         seed: args.seed,
@@ -103,7 +103,7 @@ fn simulated(args: &Args, console: &Console) -> Result<(PathBuf, PathBuf)> {
     Ok((made.station, folder))
 }
 
-/// How good the scan and the poses found in it are.
+/// A summary of the scan's accuracy and of the poses found in it.
 fn words(report: &ScanReport, errors: &Judged, parts: &[FoundPart]) -> String {
     let e = &errors.cloud;
     let mut text = format!(

@@ -1,4 +1,4 @@
-//! In: the command line. Out: what an insertion bears and how far the tool keeps off, for recipes that are made here.
+//! In: the command line. Out: tolerances of an insertion and distances of approach and retract, for new recipes.
 //! Frame and unit: part frame; mm, degrees.
 
 use crate::find::insert::recipe::InsertionSpec;

@@ -1,5 +1,5 @@
-//! In: a running camera, a station. Out: one line a measured picture: its points, how long it took, how many were
-//! passed over meanwhile; the account. Frame and unit: camera frame, mm; milliseconds.
+//! In: a running camera, a station. Out: one line per measured picture with its points, its latency and the number
+//! of skipped pictures; the account. Frame and unit: camera frame, mm; milliseconds.
 
 use super::capture::options::Running;
 use super::terminal::console::Console;
@@ -47,10 +47,10 @@ pub struct Args {
 #[derive(serde::Serialize)]
 struct Line {
     frame: u64,
-    /// From the frame's last byte to its points.
+    /// Delay from the frame's last byte to its points, ms.
     latency_ms: f64,
     points: usize,
-    /// Frames passed over so far.
+    /// Number of frames skipped so far.
     passed_over: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     xyz_sigma_mm: Option<Vec<[f32; 4]>>,
@@ -66,7 +66,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         running.camera.get_or_insert(CameraUri::Input);
     }
     let begin = |pictures: Pictures| Live::new(&rig, pictures, &settings.extraction, volume.as_ref(), args.on);
-    // A stated format is judged, and the GPU opened, before pictures come.
+    // A stated format is checked, and the GPU opened, before pictures arrive.
     let early =
         args.raw.map(|raw| begin(Pictures { format: raw.format, readout: running.readout.stated() })).transpose()?;
     let feed = running.open(args.raw, Mode::Newest)?;
@@ -81,7 +81,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             Fed::Quiet => continue,
             Fed::Ended(fault) => break fault,
         };
-        // Looked at only while nothing was seen: it takes as long as a stage.
+        // Only examined until something was measured, because it takes as long as a stage.
         let light = (measured_count == 0).then(|| Light::of(&picture.image));
         let frame = picture.id;
         let measured = live.measure(frame as u32, picture.image)?;
@@ -128,7 +128,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     ended.map_or(Ok(()), Err::<(), Fault>)
 }
 
-/// Median and 99th percentile.
+/// Median and 99th percentile of the delays.
 fn delays(waits: &Delays) -> String {
     waits.so_far().map_or("none".into(), |d| d.to_string())
 }

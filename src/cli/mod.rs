@@ -1,5 +1,5 @@
-//! In: the command line. Out: one library call a subcommand, its result on stdout, talk on stderr.
-//! Frame and unit: as the subcommands say; every number is printed with its unit.
+//! In: the command line. Out: one library call per subcommand, its result on stdout, messages on stderr.
+//! Frame and unit: stated by the subcommands; every number is printed with its unit.
 
 mod bench;
 mod board;

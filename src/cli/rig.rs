@@ -1,4 +1,4 @@
-//! The calculator of the hardware guide: prints what a planned rig will resolve.
+//! The calculator of the hardware guide: prints the resolution of a planned rig.
 
 use super::terminal::arguments::parse;
 use super::terminal::console::Console;

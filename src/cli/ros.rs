@@ -1,5 +1,5 @@
-//! In: a scan folder, and where given its recording, station and found parts. Out: an MCAP file with ROS 2 messages.
-//! Frame and unit: the scan's frame, under the name that it is given; metres in the file.
+//! In: a scan folder, optionally its recording, station and found parts. Out: an MCAP file with ROS 2 messages.
+//! Frame and unit: the scan's frame, under the name from the options; metres in the file.
 
 use crate::cli::terminal::console::Console;
 use crate::cli::terminal::outputs;

@@ -101,7 +101,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         ..ScanOptions::for_station(&settings, &rig, &args.out)
     };
     if let Some(truth) = &args.truth {
-        // A wrong path shall not cost a scan.
+        // A wrong path must be reported before the scan.
         crate::files::length(truth)?;
     }
     let bar = console.bar("scanning", 0);
@@ -181,7 +181,7 @@ fn from_recording(
     scan_recording(&recording, args.poses.as_deref(), rig, options, shown_by(bar))
 }
 
-/// Frames on standard input.
+/// Scans frames from standard input.
 fn from_pipe(
     args: &Args,
     raw: RawFormat,
@@ -208,7 +208,7 @@ fn from_pipe(
     crate::station::scan("pipe", "standard input", open, rig, options, shown_by(bar))
 }
 
-/// Tells a bar how many shots are done, and of how many.
+/// Updates a bar with the number of finished shots and their total.
 fn shown_by(bar: &ProgressBar) -> impl Fn(usize, Option<usize>) + Sync {
     |done, total| {
         bar.set_length(total.unwrap_or(done) as u64);
@@ -216,7 +216,7 @@ fn shown_by(bar: &ProgressBar) -> impl Fn(usize, Option<usize>) + Sync {
     }
 }
 
-/// What the middle shot of a recording shows, and what is asked of it; nothing where it cannot be read.
+/// What the middle shot of a recording shows, compared with the requirements; empty if it cannot be read.
 fn seen(folder: &Path, channel: Channel) -> String {
     let read = || {
         let mut recording = Recording::open(folder).ok()?;
@@ -232,7 +232,7 @@ fn seen(folder: &Path, channel: Channel) -> String {
     read().unwrap_or_default()
 }
 
-/// The picture with the laser off that --ambient names, of the frames' size.
+/// The picture with the laser off that --ambient names; it must have the frames' size.
 fn ambient_beside(args: &Args, f: Format) -> Result<Option<Image>> {
     let load = |path: &PathBuf| load_sized(path, args.channel, f.bits, [f.width, f.height]).map_err(no_ambient);
     args.ambient.as_ref().map(load).transpose()
@@ -245,7 +245,7 @@ fn no_ambient(fault: Fault) -> Fault {
         .next("take one picture with the laser off and nothing else changed")
 }
 
-/// What `--json` prints with `--truth`.
+/// The output of `--json` with `--truth`.
 #[derive(serde::Serialize)]
 struct WithErrors {
     #[serde(flatten)]

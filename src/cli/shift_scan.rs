@@ -90,7 +90,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     crate::files::write(&part.join("shift.json"), text.as_bytes())?;
     if cloud.len() >= 100 {
         let far = cloud.iter().fold([0f32; 2], |m, p| [m[0].max(p.position[0]), m[1].max(p.position[1])]);
-        // A cell is no finer than the travel, or rows without points would lie between the pictures.
+        // A cell is not smaller than the travel: otherwise rows without points would lie between the pictures.
         let cell = args.travel_mm.max(2.0 / args.pixels_per_mm);
         let cells = far.map(|x| (f64::from(x) / cell).ceil() as u32 + 1);
         let frame: Rigid<Base, Grid> = Rigid::new(nalgebra::Matrix3::identity(), Vec3::new(0.0, -0.5 * cell, 0.0));
@@ -103,7 +103,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     Ok(())
 }
 
-/// Takes the former scan's files away when the new one's are whole.
+/// Removes the previous scan's files when the new ones are complete.
 fn clear(out: &Path, _: &Path) -> std::io::Result<()> {
     ["cloud.ply", "shift.json"].into_iter().chain(MAP_FILES).try_for_each(|name| remove(&out.join(name)))
 }

@@ -1,4 +1,4 @@
-//! In: what to simulate. Out: recording folders, truth and a station with the true calibration.
+//! In: options of a simulation. Out: recording folders, truth and a station with the true calibration.
 //! Frame and unit: as in the recording format; mm, degrees, pixels.
 
 use crate::cli::terminal::console::Console;
@@ -77,7 +77,7 @@ pub struct Args {
     pose_noise_deg: f64,
 }
 
-/// What `--motion` names.
+/// A value of `--motion`.
 #[derive(Clone, Copy, Debug)]
 struct Moved(Option<AxisKind>);
 
@@ -93,7 +93,7 @@ impl std::str::FromStr for Moved {
     }
 }
 
-/// A turn is so many times as long at the scene's ends as a pass over it.
+/// At the scene's ends a turn is this many times as long as a pass over the scene.
 const TURN_OVER_PASS: usize = 10;
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {

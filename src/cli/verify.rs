@@ -1,4 +1,4 @@
-//! In: a station, scans of a flat surface, touched points. Out: fit and verification, apart.
+//! In: a station, scans of a flat surface, touched points. Out: results of fit and verification, separately.
 //! Frame and unit: base frame; mm, px, degrees.
 
 use crate::cli::terminal::console::Console;

@@ -1,6 +1,6 @@
-//! In: a station. Out: all that a person chose and measured of it in one file, and the way back; jobs and recordings
-//! are none of it.
-//! Frame and unit: texts, as they lie in the station.
+//! In: a station. Out: all its settings and measurements in one file, and their restoration; jobs and recordings
+//! are not included.
+//! Frame and unit: file contents as stored in the station.
 
 use super::settings::Settings;
 use crate::fault::{Fault, Result};
@@ -12,12 +12,12 @@ use std::path::{Path, PathBuf};
 
 /// Version of the file.
 const FORMAT: u32 = 1;
-/// What a station is made of: its settings, and folders of texts.
+/// The content of a station: its settings, and folders of texts.
 const SETTINGS: &str = "station.toml";
 const FOLDERS: [&str; 3] = ["calibration", "recipes", "boards"];
-/// Bytes of a file in it at most.
+/// Most bytes of one file of a backup.
 const MOST_BYTES: u64 = 64 << 20;
-/// Files of a backup at most.
+/// Most files of a backup.
 const MOST_FILES: usize = 2000;
 
 /// A station in one file.
@@ -28,30 +28,30 @@ pub struct Backup {
     pub format: u32,
     /// Name and version of the program that made it.
     pub program: String,
-    /// When, UTC, RFC 3339.
+    /// Time of the backup, UTC, RFC 3339.
     pub created: String,
     /// The station's name.
     pub station: String,
-    /// SHA-256 over all names and what is in the files.
+    /// SHA-256 over all names and file contents.
     pub seal: String,
     /// Texts by their path in the station.
     pub files: BTreeMap<String, String>,
-    /// Files that are no texts, in base64: a recipe that was spoilt is backed up as it is.
+    /// Files that are not texts, in base64: even a damaged recipe is backed up unchanged.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub spoilt: BTreeMap<String, String>,
 }
 
-/// Of the texts alone where there is nothing else, as former versions have it.
+/// The seal covers the texts alone if there is nothing else, as in backups of earlier versions.
 fn seal(files: &BTreeMap<String, String>, spoilt: &BTreeMap<String, String>) -> String {
     let all = if spoilt.is_empty() { serde_json::to_vec(files) } else { serde_json::to_vec(&(files, spoilt)) };
     hash_text(&all.expect("plain data"))
 }
 
 impl Backup {
-    /// Reads the station as it stands.
+    /// Reads the present state of a station.
     ///
     /// # Errors
-    /// No station, a file in it that cannot be read.
+    /// The folder is not a station, or a file in it cannot be read.
     pub fn of(station: &Path) -> Result<Backup> {
         let (mut files, mut spoilt) = (BTreeMap::new(), BTreeMap::new());
         let mut add = |name: String, path: &Path| -> Result<()> {
@@ -61,14 +61,14 @@ impl Backup {
             }
             Ok(())
         };
-        // A station without settings has the usual ones.
+        // A station without settings has the defaults.
         if FOLDERS.iter().all(|f| !station.join(f).is_dir()) || station.join(SETTINGS).exists() {
             add(SETTINGS.into(), &station.join(SETTINGS))?;
         }
         for folder in FOLDERS {
             for entry in std::fs::read_dir(station.join(folder)).into_iter().flatten().flatten() {
                 let name = entry.file_name().to_string_lossy().into_owned();
-                // Locks, what a killed process left, and links are nothing that was chosen or measured.
+                // Locks, remains of a killed process, and links are not part of the content.
                 if known(&name) && entry.file_type().is_ok_and(|t| t.is_file()) {
                     add(format!("{folder}/{name}"), &entry.path())?;
                 }
@@ -88,7 +88,7 @@ impl Backup {
     /// Reads a file of [`Backup::store`].
     ///
     /// # Errors
-    /// Another file, another version, one that was changed.
+    /// Another kind of file, another version, or a changed file.
     pub fn load(path: &Path) -> Result<Backup> {
         Backup::parse(&crate::files::read_text(path)?).map_err(|e| e.at(path.display()))
     }
@@ -120,16 +120,17 @@ impl Backup {
         Ok(b)
     }
 
-    /// Writes it.
+    /// Writes the backup to a file.
     pub fn store(&self, path: &Path) -> Result<()> {
         crate::files::write(path, serde_json::to_string_pretty(self).expect("plain data").as_bytes())
     }
 
-    /// Puts a station into the state of the backup; what it has beside that stays (jobs, recordings, logs). All of it
-    /// or nothing.
+    /// Restores a station to the state of the backup, completely or not at all. Other content of the station stays
+    /// (jobs, recordings, logs).
     ///
     /// # Errors
-    /// A backup whose settings or calibrations this version refuses, the disk: the station is as it was then.
+    /// This version refuses the settings or calibrations of the backup, or the disk fails; the station is then
+    /// unchanged.
     pub fn restore(&self, station: &Path) -> Result<()> {
         crate::files::make_folder(station)?;
         let _lock = Lock::take(station, "restore", "restore")?;
@@ -150,7 +151,7 @@ impl Backup {
         }
         let checked = Settings::load(&part).and_then(|_| Rig::load(&part));
         if let Err(fault) = checked {
-            // It goes with the next restore where it cannot be taken away now.
+            // If it cannot be removed now, the next restore removes it.
             let _ = remove(&part);
             return Err(fault);
         }
@@ -158,7 +159,7 @@ impl Backup {
     }
 }
 
-/// Ends a restore that was cut off.
+/// Completes a restore that was interrupted.
 pub fn settle_restore(station: &Path) -> Result<()> {
     together(station).settle()
 }
@@ -170,18 +171,18 @@ fn together(station: &Path) -> Together<'_> {
     })
 }
 
-/// Whether a file's name is one that a station has: letters, digits and marks that no file system minds.
+/// Whether a file name can belong to a station: letters, digits and characters that every file system accepts.
 fn known(name: &str) -> bool {
     let ending = Path::new(name).extension().is_some_and(|e| ["toml", "json", "html"].iter().any(|k| e == *k));
     ending && !name.starts_with('.') && name.chars().all(|c| c.is_alphanumeric() || " ._-+()".contains(c))
 }
 
-/// Where a station keeps its own backups.
+/// The folder of a station's own backups.
 pub fn backups(station: &Path) -> PathBuf {
     station.join("backups")
 }
 
-/// Backs a station up into its own folder of backups; its name there.
+/// Backs a station up into its own folder of backups; returns the file's name there.
 pub fn back_up_here(station: &Path, why: &str) -> Result<String> {
     let backup = Backup::of(station)?;
     let at = backup.created.split('.').next().unwrap_or_default().replace([':', '-'], "").replace('T', "-");

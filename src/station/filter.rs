@@ -1,5 +1,5 @@
-//! In: a finished scan, filters. Out: another scan folder with the points and cells that they leave, and what was
-//! done in its report.
+//! In: a finished scan, filters. Out: another scan folder with the remaining points and cells; its report lists the
+//! filters.
 //! Frame and unit: the scan's; filters in its height map's grid, mm.
 
 use super::scan::products;
@@ -12,13 +12,13 @@ use crate::rig::hash_file;
 use crate::scan::{CloudPoint, CloudWriter, Filter, HeightMap, MOST_FILTERS, SHOTS_FILE};
 use std::path::Path;
 
-/// Points below which nothing is left to look at.
+/// Fewest points of a filtered scan.
 const FEWEST: usize = 100;
 
-/// Applies filters to a map in their order; how many cells each took.
+/// Applies filters to a map in their order; returns how many cells each removed.
 ///
 /// # Errors
-/// Too many, or one whose numbers mean nothing.
+/// Too many filters, or a filter with invalid parameters.
 pub fn filter_map(map: &mut HeightMap, filters: &[Filter]) -> Result<Vec<usize>> {
     if filters.len() > MOST_FILTERS {
         return Err(Fault::usage(format!("{} filters, at most {MOST_FILTERS} are applied", filters.len()))
@@ -28,7 +28,7 @@ pub fn filter_map(map: &mut HeightMap, filters: &[Filter]) -> Result<Vec<usize>>
     Ok(filters.iter().map(|f| f.apply(map)).collect())
 }
 
-/// Which points stay: all but those in cells that were taken away.
+/// Whether a point remains: all points remain except those in cells that were removed.
 pub fn left<'a>(before: &'a HeightMap, after: &'a HeightMap) -> impl Fn(&glam::Vec3) -> bool + 'a {
     let grid_from_base = before.base_from_grid.inverse();
     move |position| {
@@ -38,10 +38,10 @@ pub fn left<'a>(before: &'a HeightMap, after: &'a HeightMap) -> impl Fn(&glam::V
     }
 }
 
-/// Makes the filtered scan. Its map has the former one's grid, so that both can be compared cell by cell.
+/// Writes the filtered scan. Its map has the grid of the original, so that both can be compared cell by cell.
 ///
 /// # Errors
-/// A folder that holds no scan or another one, filters that leave nothing.
+/// `scan` holds no scan, `out` holds an unfiltered one, or the filters leave fewer than `FEWEST` points.
 pub fn filter_scan(scan: &Path, filters: &[Filter], out: &Path) -> Result<ScanReport> {
     if filters.is_empty() {
         return Err(Fault::usage("no filter was given").next("give one, for example islands:20,0.5"));
@@ -99,7 +99,7 @@ pub fn filter_scan(scan: &Path, filters: &[Filter], out: &Path) -> Result<ScanRe
     Ok(report)
 }
 
-/// The frame's name as a cloud's header has it.
+/// The frame's name for a cloud's header.
 fn frame(report: &ScanReport) -> Result<&'static str> {
     let known = ["base", "axis", "flange", "map"].into_iter().find(|f| *f == report.frame);
     known.ok_or_else(|| Fault::input(format!("the scan's frame is {:?}", report.frame)).next("scan again"))

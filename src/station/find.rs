@@ -1,6 +1,6 @@
-//! In: a scan folder, a recipe, the station that scanned. Out: the insertion's report and its picture;
-//! a scan taken with another calibration than the station's is refused.
-//! Frame and unit: the scan's frame, mm; plans of a second look: base.
+//! In: a scan folder, a recipe, the station that made the scan. Out: the insertion's report and its picture. A scan
+//! that was made with another calibration than the station's is refused.
+//! Frame and unit: the scan's frame, mm; plans of a verification scan: base.
 
 use super::height_witness::height_witness;
 use super::scan::held::HeldScan;
@@ -16,7 +16,7 @@ use crate::rig::Rig;
 use crate::scan::{CloudPoint, GridOptions, Shots, grid, parts_for};
 use std::path::{Path, PathBuf};
 
-/// What is known of one part: finished scans of it, and pictures of the pointer's spot on it.
+/// The data of one part: finished scans of it, and pictures of the pointer's spot on it.
 #[derive(Clone, Copy)]
 pub struct Looked<'a> {
     /// Folders of finished scans, one or more; the first gives picture and map.
@@ -25,9 +25,9 @@ pub struct Looked<'a> {
     pub range: Option<&'a Recording>,
 }
 
-/// Finds the recipe's part in one or more finished scans of it and brings them together ([`agree`]), with the
-/// pointer's distances as a witness of the height; the picture is the first scan's. Errors: those of each scan; of
-/// several, the first.
+/// Finds the recipe's part in one or more finished scans of it and combines the results ([`agree`]). The pointer's
+/// distances serve as an independent measure of the height. The picture is the first scan's. Errors: those of each
+/// scan; with several scans, the first error.
 pub fn find_part_in_all(
     looked: &Looked,
     recipe: &Recipe,
@@ -58,8 +58,8 @@ pub fn find_part_in_all(
     Ok((agree(reports, witness.as_ref(), recipe, options.robot)?, picture))
 }
 
-/// Refuses looks that cannot show anything: without the station nothing says what they may disagree about, and one
-/// scan agrees with itself whatever is wrong.
+/// Refuses scans whose comparison shows nothing: without the station the expected disagreement is unknown, and a
+/// scan always agrees with itself.
 fn comparable(scans: &[PathBuf], station: Option<&Path>) -> Result<()> {
     if station.is_none() {
         return Err(Fault::usage("several scans are compared, but no station is given")
@@ -69,7 +69,7 @@ fn comparable(scans: &[PathBuf], station: Option<&Path>) -> Result<()> {
     different(scans)
 }
 
-/// Refuses one scan under two names.
+/// Refuses the same scan under two names.
 pub(super) fn different(scans: &[PathBuf]) -> Result<()> {
     let clouds: Vec<Option<String>> =
         scans.iter().map(|s| Ok(load_report(s)?.files.get("cloud.ply").cloned())).collect::<Result<_>>()?;
@@ -87,17 +87,17 @@ pub(super) fn different(scans: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// Where the robot goes for a second look at the part of a scan, shot by shot, and what the two looks can show.
+/// The robot's poses for a verification scan of a part, shot by shot, and what the two scans together can show.
 pub struct SecondLook {
     /// The part as the first scan shows it.
     pub report: Report,
-    /// The sensor's motion, and what the two looks can show.
+    /// The sensor's motion, and what the two scans can show.
     pub plan: LookPlan,
     /// base_from_flange for each shot of the first scan that saw the part's surroundings.
     pub flanges: Vec<Rigid<Base, Flange>>,
 }
 
-/// Plans a second look ([`plan_look`]) from a finished scan and the poses of its recording.
+/// Plans a verification scan ([`plan_look`]) from a finished scan and the poses of its recording.
 pub fn second_look(
     scan: &Path,
     poses: &[Rigid<Base, Flange>],
@@ -118,7 +118,7 @@ pub fn second_look(
     Ok(SecondLook { report, plan, flanges })
 }
 
-/// Finds the recipe's part in a finished scan. Without `station` the budget lacks the calibrations.
+/// Finds the recipe's part in a finished scan. Without `station` the error budget lacks the calibrations.
 pub fn find_part(
     scan: &Path,
     recipe: &Recipe,
@@ -133,8 +133,8 @@ pub fn find_part(
     Ok((report, image))
 }
 
-/// Finds the recipe's part in a scan in memory; `rig` is the one that scanned. Without it the budget lacks the
-/// calibrations.
+/// Finds the recipe's part in a scan in memory; `rig` is the one that made the scan. Without it the error budget
+/// lacks the calibrations.
 pub fn find_part_held(
     held: &HeldScan,
     recipe: &Recipe,
@@ -153,7 +153,7 @@ pub fn find_part_held(
     Ok((report, image))
 }
 
-/// The part in a scan's points, where the sheet's middle meets the rays of their light.
+/// Finds the part in a scan's points, which lie where the middle of the laser sheet meets the camera's rays.
 fn located(
     cloud: &[CloudPoint],
     shots: &Shots,
@@ -162,7 +162,8 @@ fn located(
     rig: Option<&Rig>,
     options: &LocateOptions,
 ) -> Result<Report> {
-    // A turntable's part turns before the camera: heights are those over the table, z of the axis frame.
+    // A turntable turns the part in front of the camera: heights are measured over the table, along z of the axis
+    // frame.
     let over_table = (scanned.motion.axis() == Some(AxisKind::Turntable)).then(Vec3::z);
     let options = &LocateOptions { up: options.up.or(over_table), ..options.clone() };
     let mut report = locate(cloud, shots, recipe, rig, options)?;
@@ -177,10 +178,10 @@ fn located(
     Ok(report)
 }
 
-/// The parts of a station's rig that a finished scan rests on; `scanned` is the report of the folder `scan`.
+/// The parts of a station's rig that a finished scan depends on; `scanned` is the report of the folder `scan`.
 ///
 /// # Errors
-/// Calibrations that do not belong together, or are not those that the scan was made with.
+/// Calibrations that do not belong together, or differ from those with which the scan was made.
 pub fn rig_that_scanned(station: &Path, scan: &Path, scanned: &ScanReport) -> Result<Rig> {
     let rig = parts_for(&Rig::load(station)?, &scanned.motion);
     rig.belong_together().map_err(|e| e.at(station.display()))?;
@@ -203,7 +204,7 @@ pub(super) fn fits(rig: &Rig, scan: &Path, scanned: &ScanReport) -> Result<()> {
     .next("scan again with the present calibration, or give the station that scanned"))
 }
 
-/// Teaches a part from a finished scan: the recipe, its proof on that scan, and a picture of it.
+/// Teaches a part from a finished scan: the recipe, its test on that scan, and a picture of it.
 pub fn teach_part(scan: &Path, options: &TeachOptions) -> Result<(Recipe, Report, RgbImage)> {
     taught(&lit_cloud_of(scan)?, &shots_of(scan)?, options).map_err(|e| e.at(scan.display()))
 }

@@ -1,6 +1,6 @@
-//! In: where a part was found, its drawing, a rig whose camera rides on the robot, where the flange stood. Out: the
-//! part's outlines as that camera sees them: over its picture they lie on the part, or the calibration, the pose or
-//! the part is not what it is taken for.
+//! In: the pose of a found part, its drawing, a rig whose camera is on the robot, the flange's pose. Out: the
+//! part's outlines in that camera's picture. If they do not lie on the pictured part, the calibration, the pose or
+//! the part differs from what was assumed.
 //! Frame and unit: base frame, mm; pixels of the camera's picture, an integer pixel is a pixel's centre.
 
 use crate::camera::Intrinsics;
@@ -10,15 +10,15 @@ use crate::geometry::{Base, Camera, Flange, Part, Rigid, Vec2, Vec3};
 use crate::rig::{Rig, hash_text};
 use std::path::Path;
 
-/// Pieces of an outline are so short a share of the distance to the camera: a lens bends what is straight.
+/// Length of an outline's pieces as a share of the distance to the camera: a lens bends straight lines.
 const PIECE: f64 = 0.01;
-/// Pieces of one edge at most.
+/// Most pieces of one edge.
 const MOST_PIECES: f64 = 400.0;
 
-/// What `find` wrote of a part: enough to draw it.
+/// The fields of a `find` report that are needed to draw the part.
 #[derive(Clone, Debug, serde::Deserialize)]
 pub struct Lies {
-    /// Name of the recipe that was looked for.
+    /// Name of the recipe of the search.
     pub recipe: String,
     /// Frame of the pose.
     pub frame: String,
@@ -30,7 +30,7 @@ impl Lies {
     /// Reads a report of `find`.
     ///
     /// # Errors
-    /// No such file, or none of `find`.
+    /// There is no such file, or it is not a report of `find`.
     pub fn load(path: &Path) -> Result<Lies> {
         Lies::parse(&crate::files::read_text(path)?).map_err(|e| e.at(path.display()))
     }
@@ -38,7 +38,7 @@ impl Lies {
     /// Reads the text of a report of `find`.
     ///
     /// # Errors
-    /// It is none.
+    /// The text is not such a report.
     pub fn parse(text: &str) -> Result<Lies> {
         serde_json::from_str(text).map_err(|e| {
             Fault::input(format!("is not a report of a part that was found: {e}"))
@@ -47,17 +47,18 @@ impl Lies {
         })
     }
 
-    /// The drawing's outlines where the part lies, in the report's frame, mm; closed ones end where they begin.
+    /// The drawing's outlines at the part's pose, in the report's frame, mm; closed ones end where they begin.
     pub fn outlines(&self, drawing: &Drawing) -> Vec<Vec<Vec3>> {
         let place = |line: Vec<Vec3>| line.iter().map(|p| self.base_from_part.point(p)).collect();
         drawing.outlines().into_iter().map(place).collect()
     }
 }
 
-/// Those outlines as the camera on the flange sees them, px; a line ends where it leaves what the lens can show.
+/// Those outlines in the picture of the camera on the flange, px; a line ends where it leaves the range of the
+/// lens.
 ///
 /// # Errors
-/// A pose in another frame than the robot's base; a rig without camera or hand-eye.
+/// The pose is in a frame other than the robot's base, or the rig lacks camera or hand-eye.
 pub fn ghost(lies: &Lies, drawing: &Drawing, rig: &Rig, flange: &Rigid<Base, Flange>) -> Result<Vec<Vec<[f64; 2]>>> {
     if lies.frame != "base" {
         return Err(Fault::refused(format!("the part lies in the frame '{}', not in the robot's base", lies.frame))
@@ -74,7 +75,7 @@ pub fn ghost(lies: &Lies, drawing: &Drawing, rig: &Rig, flange: &Rigid<Base, Fla
     Ok(lies.outlines(drawing).iter().flat_map(seen).collect())
 }
 
-/// A line of the camera's frame in its picture, in as many pieces as it is seen in.
+/// Projects a line of the camera's frame into the picture, split into its visible pieces.
 fn pictured(camera: &Intrinsics, line: &[Vec3]) -> Vec<Vec<[f64; 2]>> {
     let mut out = vec![Vec::new()];
     let mut add = |p: Vec3| match pixel(camera, &p) {
@@ -92,7 +93,7 @@ fn pictured(camera: &Intrinsics, line: &[Vec3]) -> Vec<Vec<[f64; 2]>> {
     out
 }
 
-/// Where the lens shows a point; beyond what it was calibrated for the polynomial turns back, and nothing is shown.
+/// The pixel of a point; `None` beyond the range of the lens polynomial, where it folds back.
 fn pixel(camera: &Intrinsics, p: &Vec3) -> Option<Vec2> {
     let connected = p.z > 0.0 && camera.distortion.connected(&Vec2::new(p.x / p.z, p.y / p.z));
     camera.pixel_from_point(p).filter(|_| connected)

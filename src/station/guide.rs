@@ -1,6 +1,6 @@
-//! In: a recording of the pointer on the board, one of the line over the part, a recipe, a station.
-//! Out: the semi-autonomous procedure step by step — normal, view pose, scan, part, approach, insertion,
-//! retract — each with its numbers and, where a person would decide, a question.
+//! In: a recording of the pointer on the board, one of the line over the part, a recipe, a station. Out: the
+//! semi-autonomous procedure step by step — normal, view pose, scan, part, approach, insertion, retract — each with
+//! its numbers and, where a person has to decide, a question.
 //! Frame and unit: base frame; mm, degrees.
 
 use super::range::{RangeReport, RangeRun, SurfaceFound, measure_range};
@@ -20,7 +20,7 @@ use crate::robot::Convention;
 use crate::scan::Where;
 use std::path::PathBuf;
 
-/// What the procedure works on.
+/// Inputs and options of the procedure.
 #[derive(Clone, Debug)]
 pub struct GuideOptions {
     /// Folder of the station: station.toml and calibrations.
@@ -41,14 +41,15 @@ pub struct GuideOptions {
     pub robot: Convention,
     /// Where the scan's stages run.
     pub place: Where,
-    /// Distance of the camera from the board when it looks at it squarely, mm; `None`: where the rig works.
+    /// Distance of the camera from the board in the square view, mm; `None`: the middle of the rig's working
+    /// volume.
     pub view_mm: Option<f64>,
-    /// Largest angle between the touched board and the found part, degrees, 0.1 to 20: parts sit a little
-    /// askew, but not by more.
+    /// Largest angle between the touched board and the found part, degrees, 0.1 to 20: a part may be slightly
+    /// tilted.
     pub max_tilt_deg: f64,
 }
 
-/// A step that was done, or that is about to be done.
+/// A step that was completed or is about to begin.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Step {
     /// One or two words, e.g. "approach".
@@ -61,20 +62,20 @@ pub struct Step {
     pub pose: Option<Vec<f64>>,
 }
 
-/// The procedure as it went.
+/// The procedure's result.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Guided {
-    /// In the order in which they were done.
+    /// The steps in the order in which they were done.
     pub steps: Vec<Step>,
     /// True when every step was done and confirmed.
     pub finished: bool,
     /// Notation of the steps' poses, see [`Convention::name`].
     pub convention: &'static str,
-    /// Of the touched board: unit length, towards the camera; base frame.
+    /// Unit normal of the touched board, towards the camera; base frame.
     pub normal: [f64; 3],
     /// Angle between the part's top and the touched board, degrees.
     pub tilt_to_part_deg: f64,
-    /// What was found of the part.
+    /// The report on the found part.
     pub report: Report,
 }
 
@@ -98,7 +99,7 @@ impl GuideOptions {
     }
 }
 
-/// Runs the procedure. `confirm` is shown every step and answers its question; a "no" ends it with a
+/// Runs the procedure. `confirm` is shown every step and answers its question; a "no" ends the procedure with a
 /// refusal that names the step. Nothing is moved here: the poses are for the robot's own program.
 pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bool>) -> Result<Guided> {
     options.check()?;
@@ -139,7 +140,7 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Shows a step; a refusal where the operator says no.
+    /// Shows a step; refuses if the operator says no.
     fn pass(&mut self, step: Step) -> Result<()> {
         let go = (self.confirm)(&step)?;
         let name = step.name;
@@ -150,7 +151,7 @@ impl Run<'_> {
         Err(Fault::refused(format!("stopped at '{name}' by the operator")).next("start again when the cell is ready"))
     }
 
-    /// The board by the pointer's spots on it.
+    /// Measures the board from the pointer's spots on it.
     fn touch(&mut self) -> Result<SurfaceFound> {
         let touched = measure_range(
             &Recording::open(&self.options.touch)?,
@@ -161,7 +162,7 @@ impl Run<'_> {
         Ok(touched.surface.expect("asked for"))
     }
 
-    /// The flange pose from which the camera looks at the board squarely.
+    /// Computes the flange pose from which the camera views the board squarely.
     fn look_squarely(&mut self, surface: &SurfaceFound, hand_eye: &Rigid<Flange, Camera>) -> Result<()> {
         let far = match self.options.view_mm {
             Some(mm) => Volume::new(mm, mm, "stated"),
@@ -181,7 +182,7 @@ impl Run<'_> {
         })
     }
 
-    /// The line over the part.
+    /// Scans the part with the line.
     fn scan(&mut self) -> Result<ScanReport> {
         let options = self.options;
         self.pass(Step {
@@ -196,7 +197,8 @@ impl Run<'_> {
         scan_recording(&recording, poses, &self.rig, &ScanOptions { place: options.place, ..settings }, |_, _| {})
     }
 
-    /// The part in the scan, drawn for the operator, and the angle between its top and the board, degrees.
+    /// Finds the part in the scan and draws it for the operator; also returns the angle between its top and the
+    /// board, degrees.
     fn find(&self, normal: &Vec3) -> Result<(Report, f64)> {
         let (options, folder) = (self.options, self.options.scan_folder());
         let (cloud, shots) = (super::lit_cloud_of(&folder)?, super::shots_of(&folder)?);
@@ -209,7 +211,7 @@ impl Run<'_> {
         Ok((report, tilt))
     }
 
-    /// Where the tool goes; a refusal where a gate failed, or where the part does not lie as the board does.
+    /// The tool's poses; refuses if a gate failed or the part is tilted against the board.
     fn poses(&self, report: &Report, tilt: f64) -> Result<Poses> {
         let Some(poses) = report.poses.clone() else {
             return Err(Fault::refused(format!("no pose: {}", report.reasons.join("; ")))
@@ -276,8 +278,8 @@ fn touched_words(r: &RangeReport) -> Vec<String> {
     out
 }
 
-/// The flange pose from which the camera looks along the surface's normal at its centre. `tool` has z out
-/// of the surface; the camera's z points into it, its x along the tool's x.
+/// The flange pose for a camera view along the surface's normal at its centre. `tool` has z out of the surface; the
+/// camera's z points into it, its x along the tool's x.
 fn square_view(
     tool: &Mat3,
     centre: &Vec3,

@@ -1,6 +1,6 @@
-//! In: pictures of the pointer's spot on a part, the part as scans found it, the station. Out: by how much each spot
-//! lies above the part's surfaces, with all that it depends on: a witness of the height that knows nothing of the
-//! laser plane.
+//! In: pictures of the pointer's spot on a part, the part as scans found it, the station. Out: the height of each
+//! spot above the part's surfaces, with its dependence on the calibrations: a measure of the height that does not
+//! use the laser plane.
 //! Frame and unit: base axes; mm, rad. docs/math.md, Second look (7).
 
 use super::range::{RangeRun, Touched, touched};
@@ -16,13 +16,13 @@ use crate::recording::Recording;
 use crate::rig::Rig;
 use nalgebra::{DMatrix, DVector};
 
-/// A spot farther from every surface than this, in the recipe's gates of height, lies on something else.
+/// A spot farther than this from every surface, in units of the recipe's height gate, lies on something else.
 const BESIDE: f64 = 15.0;
-/// A spot nearer than this to an edge, in the recipe's margins, may be cut by it.
+/// A spot nearer than this to an edge, in units of the recipe's margin, may be cut by it.
 const MARGINS: f64 = 2.0;
 
-/// Heights of the pointer's spots over the surfaces of the part of `report`, and what is to be said of the pictures.
-/// Errors: those of [`super::measure_range`]; no spot on a surface of the part.
+/// Heights of the pointer's spots over the surfaces of the part of `report`, and notes on the pictures. Errors:
+/// those of [`super::measure_range`]; no spot lies on a surface of the part.
 pub(super) fn height_witness(
     recording: &Recording,
     rig: &Rig,
@@ -59,7 +59,7 @@ pub(super) fn height_witness(
     Ok((witness(&on, &shared, &part.direction(&Vec3::z()), &part.translation), said))
 }
 
-/// Height of a place (part frame) over the surface that it lies on.
+/// Height of a point (part frame) over the nearest surface.
 fn height(q: &Vec3, recipe: &Recipe) -> std::result::Result<f64, String> {
     let (drawing, m) = (recipe.drawing(), &recipe.measure);
     let edges = EdgeIndex::new(&drawing, m.margin_mm / 0.5);

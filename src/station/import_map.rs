@@ -1,5 +1,5 @@
-//! In: a height map or cloud of another sensor, and what its user states about it. Out: a scan folder on which `find`
-//! works, with where it came from.
+//! In: a height map or cloud of another sensor, and what its user states about it. Out: a scan folder that `find`
+//! accepts, with the origin of the data.
 //! Frame and unit: the file's own frame, which the folder calls map; mm.
 
 use super::scan::products;
@@ -18,16 +18,16 @@ use std::time::Instant;
 
 /// Frame of imported points.
 const FRAME: &str = "map";
-/// Stands for the calibrations of a rig, which nobody here knows.
+/// Replaces the fingerprint of a rig, which is unknown here.
 const NO_RIG: &str = "imported";
 /// Longest file, bytes: 64 million points of 36 bytes.
 const MOST_BYTES: u64 = 36 << 26;
 
-/// Makes a scan folder of a file, or of the `page` of it (from 1 on); `light` is the picture of the light that came
-/// with a picture of heights.
+/// Makes a scan folder from a file, or from its `page` (counted from 1); `light` is the intensity picture that
+/// belongs to a height picture.
 ///
 /// # Errors
-/// Files that are not read, what must be stated and is not, a folder that holds a scan of a rig.
+/// A file cannot be read, a required statement is missing, or the folder holds a scan of a rig.
 pub fn import_map(
     file: &Path,
     page: Option<usize>,
@@ -78,7 +78,7 @@ pub fn import_map(
     Ok(report)
 }
 
-/// The report of a scan that nobody here made: what was not measured is empty.
+/// The report of an imported scan: what was not measured is empty.
 fn report(made: Lines, points: u64, imported: Imported) -> ScanReport {
     ScanReport {
         format: FORMAT,

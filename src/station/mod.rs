@@ -1,4 +1,4 @@
-//! In: a station folder, recordings, options. Out: the product's procedures from top to bottom.
+//! In: a station folder, recordings, options. Out: the product's procedures from start to end.
 //! Frame and unit: millimetres; each file names its frames.
 
 mod backup;

@@ -1,5 +1,5 @@
-//! In: an arm that was taken, one of its outputs. Out: that output tried: lasers light for a moment, the lamp changes
-//! for a moment, the gripper goes where it is told. Nothing moves.
+//! In: an arm that was taken, one of its outputs. Out: that output tried: lasers are on for a moment, the lamp
+//! changes for a moment, the gripper opens or closes as requested. Nothing moves.
 //! Frame and unit: numbers of the controller's outputs; s.
 
 use crate::arm::{Arm, Outputs, Switchboard};
@@ -8,12 +8,12 @@ use crate::recording::Beam;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// A lamp or laser that is tried is lit so long: long enough to look, short enough to look away.
+/// How long a lamp or laser that is tried stays on: long enough to see it, short enough to look away.
 pub const LIT: Duration = Duration::from_millis(1500);
-/// How often is looked meanwhile whether the program is to end.
+/// How often the stop flag is checked meanwhile.
 const GLANCE: Duration = Duration::from_millis(20);
 
-/// What hangs on an output.
+/// An action on an output that can be tried.
 #[derive(
     Clone,
     Copy,
@@ -45,10 +45,10 @@ fn unknown(word: &str) -> String {
     crate::fault::unknown::<Output>("output", word)
 }
 
-/// Tries it; the number of the output that was switched. `stop` ends the wait while something is lit.
+/// Tries an output; returns the number of the output that was switched. `stop` ends the wait while a light is on.
 ///
 /// # Errors
-/// The controller refuses or does not answer. Lasers are told to go off in any case.
+/// The controller refuses or does not answer. Lasers are switched off in any case.
 pub fn try_output(arm: &mut dyn Arm, outputs: &Outputs, what: Output, stop: &AtomicBool) -> Result<u16> {
     let mut all = Switchboard::of(arm, *outputs)?;
     match what {
@@ -64,7 +64,7 @@ pub fn try_output(arm: &mut dyn Arm, outputs: &Outputs, what: Output, stop: &Ato
     }
 }
 
-/// Waits while somebody looks.
+/// Waits while the operator looks at the light.
 fn look(stop: &AtomicBool) -> Result<()> {
     let begun = Instant::now();
     while begun.elapsed() < LIT && !stop.load(Ordering::Relaxed) {

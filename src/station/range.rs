@@ -1,5 +1,5 @@
-//! In: pictures of the pointer's spot on any surface, a station with camera and pointer, perhaps robot
-//! poses and a hand-eye calibration. Out: distances and points with sigmas, and the surface's normal.
+//! In: pictures of the pointer's spot on any surface, a station with camera and pointer, optionally robot poses and
+//! a hand-eye calibration. Out: distances and points with sigmas, and the surface's normal.
 //! Frame and unit: camera and base frame; mm, rad.
 
 use super::calibrate::hand_eye::first_line;
@@ -14,26 +14,26 @@ use crate::raster::{Image, Light};
 use crate::recording::{Beam, Recording};
 use crate::rig::{Calibration, HandEye, Rig};
 
-/// A beam can be wrong by its calibration, too: so far beside its image a spot is forgiven, px.
+/// Distance between spot and beam image that is always accepted, px: the beam's calibration has an error too.
 const FORGIVEN_PX: f64 = 1.0;
-/// A spot that an edge cuts lies beside its beam by less than this many sigmas of its profile: with nine tenths of it
-/// cut away, what is left of a normal profile has its middle at 1.75.
+/// A spot that an edge cuts lies beside its beam by less than this many sigmas of its profile. With nine tenths of
+/// a normal profile cut off, the mean of the rest lies at 1.75.
 const CUT: f64 = 2.0;
 
-/// How [`measure_range`] is run.
+/// Options of [`measure_range`].
 #[derive(Clone, Debug)]
 pub struct RangeRun {
     /// How the spot is found in the pictures.
     pub spots: SpotOptions,
     /// Pose file of the recording; `None`: the one that meta.json names, if any.
     pub poses: Option<String>,
-    /// A spot farther than this from the beam's image is no spot of this beam, sigmas; 3..=100.
+    /// Largest accepted distance of a spot from the beam's image, sigmas; 3..=100.
     pub max_off_beam: f64,
-    /// Asked is only about how far the surface is: a spot that an edge cuts counts too.
+    /// Only an approximate distance is needed: a spot that an edge cuts is accepted too.
     pub coarse: bool,
-    /// The shots are all of one plane surface: work out its normal.
+    /// All shots show one plane surface: compute its normal.
     pub one_surface: bool,
-    /// Where the tool is on the flange: its tilt against the surface, and how to stand square to it.
+    /// Pose of the tool on the flange: its tilt against the surface and its square pose are computed.
     pub tool: Option<Rigid<Flange, Tool>>,
 }
 
@@ -55,15 +55,15 @@ impl Default for RangeRun {
 pub struct Distance {
     /// Name of the laser picture.
     pub picture: String,
-    /// Distance from the beam's origin along the beam, and its sigma, mm.
+    /// Distance from the beam's origin along the beam, mm.
     pub along_beam_mm: f64,
     /// One standard deviation of the distance along the beam, mm.
     pub along_beam_sigma_mm: f64,
-    /// Distance from the camera along the optical axis, and its sigma, mm.
+    /// Distance from the camera along the optical axis, mm.
     pub along_axis_mm: f64,
     /// One standard deviation of the distance along the axis, mm.
     pub along_axis_sigma_mm: f64,
-    /// Where the beam meets the surface, camera frame, mm.
+    /// The point where the beam meets the surface, camera frame, mm.
     pub point_camera_mm: [f64; 3],
     /// One standard deviation along the camera's x, y, z, mm.
     pub point_camera_sigma_mm: [f64; 3],
@@ -88,14 +88,14 @@ pub struct SurfaceFound {
     pub normal: [f64; 3],
     /// Mean of the points, base frame, mm.
     pub centre_mm: [f64; 3],
-    /// Axes of the normal's uncertainty, degrees.
+    /// Sigmas of the normal about the two axes of its uncertainty, degrees.
     pub tilt_sigma_deg: [f64; 2],
     /// One standard deviation of the height at the centre, mm.
     pub height_sigma_mm: f64,
     /// rms distance of the points from the plane, mm; 0 for three points.
     pub rms_mm: f64,
-    /// Squared distances from the plane over what the spots' own noise makes expect: far above 1 the surface is
-    /// not flat, and its sigmas say so; 0 for three points.
+    /// Sum of squared distances from the plane over its expectation from the spots' own noise. Far above 1 the
+    /// surface is not flat, and its sigmas include that; 0 for three points.
     pub misfit: f64,
     /// The picture whose spot does not lie on the plane of the others.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -105,25 +105,26 @@ pub struct SurfaceFound {
     pub base_from_tool: Rigid<crate::geometry::Base, Tool>,
 }
 
-/// How the tool stood to the surface at the last shot, and how it stands square to it.
+/// How the tool stood relative to the surface at the last shot, and the pose in which it stands square to it.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Square {
     /// Angle of the tool's z against the normal at the last shot, degrees.
     pub tilt_deg: f64,
-    /// One standard deviation of that, with the robot's own: of a tilt that is smaller, only its size is known.
+    /// One standard deviation of that, including the robot's. If the tilt is smaller, only its magnitude is
+    /// significant.
     pub tilt_sigma_deg: f64,
-    /// The tool turned about its own origin by that tilt and no more.
+    /// The tool turned about its origin by exactly that tilt.
     #[serde(rename = "base_T_tool")]
     pub base_from_tool: Rigid<Base, Tool>,
-    /// The flange there.
+    /// The flange pose for it.
     #[serde(rename = "base_T_flange")]
     pub base_from_flange: Rigid<Base, Flange>,
 }
 
-/// What [`measure_range`] found.
+/// Result of [`measure_range`].
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct RangeReport {
-    /// One a picture whose spot was measured, in the recording's order.
+    /// One per picture whose spot was measured, in the recording's order.
     pub distances: Vec<Distance>,
     /// `None` unless [`RangeRun::one_surface`] asks for it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -133,18 +134,19 @@ pub struct RangeReport {
     pub square: Option<Square>,
     /// Pictures without a distance, with the reason.
     pub missing: Vec<(String, String)>,
-    /// What the calibrations' own files say against them, and what is not in the sigmas.
+    /// Warnings in the calibration files, and what the sigmas do not include.
     pub remarks: Vec<String>,
 }
 
-/// What the pointer touched: the report, and the points in the base frame with what they share, where poses are known.
+/// What the pointer touched: the report, and, if poses are known, the points in the base frame with their shared
+/// covariance.
 pub(super) struct Touched {
     pub report: RangeReport,
-    /// With the picture that each was seen in.
+    /// The points, each with the name of its picture.
     pub points: Vec<(String, BasePoint)>,
     pub shared: SharedCovariance,
     first_x: Option<Vec3>,
-    /// Where the flange stood at the last shot, and how far its turn is not known, rad.
+    /// Pose of the flange at the last shot, and the sigma of its rotation, rad.
     last: Option<(Rigid<Base, Flange>, f64)>,
 }
 
@@ -214,7 +216,7 @@ pub(super) fn touched(recording: &Recording, rig: &Rig, run: &RangeRun) -> Resul
 }
 
 impl Touched {
-    /// A measured point in the base frame, noted with where the flange stood.
+    /// Converts a measured point to the base frame and stores it with the flange pose.
     fn in_base(&mut self, name: &str, ranged: &Ranged, pose: &Rigid<Base, Flange>, c: &Carried<'_>) -> BasePoint {
         let robot = c.robot.unwrap_or_default();
         self.first_x.get_or_insert(Vec3::from(pose.rotation.column(0)));
@@ -225,7 +227,7 @@ impl Touched {
     }
 }
 
-/// The robot that carries the sensor: its poses, how the sensor stands on it, and its noise where that is known.
+/// The robot that carries the sensor: its poses, the pose of the sensor on it, and its noise if that is known.
 struct Carried<'a> {
     poses: Vec<Rigid<Base, Flange>>,
     hand_eye: &'a Calibration<HandEye>,
@@ -233,7 +235,7 @@ struct Carried<'a> {
 }
 
 impl<'a> Carried<'a> {
-    /// `None` where poses or hand-eye are not there and no surface asks for them.
+    /// `None` if poses or hand-eye are missing and no surface requires them.
     fn of(recording: &Recording, rig: &'a Rig, run: &RangeRun) -> Result<Option<Carried<'a>>> {
         let has_poses = run.poses.is_some() || recording.meta.pose_file.is_some();
         let poses = if has_poses { Some(recording.poses(run.poses.as_deref())?) } else { None };
@@ -249,9 +251,9 @@ impl<'a> Carried<'a> {
     }
 }
 
-/// A frame's picture with the pointer on.
+/// A frame's picture with the pointer's laser on.
 struct LaserPicture<'a> {
-    /// Of the frame.
+    /// Index of the frame.
     index: usize,
     name: &'a str,
     image: Image,
@@ -262,7 +264,7 @@ fn laser_pictures(recording: &Recording) -> Result<Vec<LaserPicture<'_>>> {
     frames.map(|(index, name)| Ok(LaserPicture { index, name, image: recording.picture(name)? })).collect()
 }
 
-/// The spot in each picture, hot pixels left out.
+/// The spot in each picture; hot pixels are excluded.
 fn spots(frames: &[LaserPicture<'_>], options: &SpotOptions) -> Result<Vec<Result<Spot>>> {
     let hot = hot_pixels(&frames.iter().map(|f| &f.image).collect::<Vec<_>>());
     let asked: Vec<SpotPicture<'_>> =
@@ -270,7 +272,7 @@ fn spots(frames: &[LaserPicture<'_>], options: &SpotOptions) -> Result<Vec<Resul
     find_spots(&asked, &hot, options)
 }
 
-/// Says what the middle picture shows.
+/// The fault of a recording without any distance; it explains what the middle picture shows.
 fn nothing_measured(report: &RangeReport, frames: &[LaserPicture<'_>]) -> Fault {
     let (name, why) = report.missing.first().cloned().unwrap_or_default();
     let fault = Fault::refused(format!("no distance could be measured; {name}: {why}"))
@@ -282,7 +284,7 @@ fn nothing_measured(report: &RangeReport, frames: &[LaserPicture<'_>]) -> Fault 
     }
 }
 
-/// Turns the tool by the least turn that brings its z onto the normal.
+/// Turns the tool by the smallest rotation that aligns its z with the normal.
 fn square(s: &Surface, flange_from_tool: &Rigid<Flange, Tool>, flange: &Rigid<Base, Flange>, rad: f64) -> Square {
     let tool = *flange * *flange_from_tool;
     let z = tool.direction(&Vec3::z());

@@ -1,4 +1,4 @@
-//! In: `station.toml`, what a person chose. Out: names, working volume, extraction settings, limits.
+//! In: `station.toml`, which a person writes. Out: names, working volume, extraction settings, limits.
 //! Frame and unit: camera frame for the working volume, mm; docs/file-formats.md lists every key.
 
 use crate::arm::{Outputs, rules::Limits};
@@ -9,45 +9,46 @@ use crate::rig::Volume;
 use crate::robot::Convention;
 use std::path::Path;
 
-/// The part of a station that a person decides. Unknown keys are refused.
+/// The settings of a station that a person decides. Unknown keys are refused.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// A name for pages and files.
+    /// A name for display on pages and in files.
     pub name: String,
-    /// How this station's robot writes poses; needed only where poses are printed for it.
+    /// The notation of this station's robot; needed only where poses are printed for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robot: Option<Convention>,
-    /// Whether the camera is on the flange or stands still; calibrations of the camera's place go by it.
+    /// Whether the camera is on the flange or stands still; it determines which camera pose is calibrated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mount: Option<Mount>,
-    /// What the work tolerates, mm: calibrations are judged by it. Without it a share of the camera's view.
+    /// Tolerance of the work, mm, by which calibrations are judged. Without it a share of the camera's view is
+    /// used.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance_mm: Option<f64>,
-    /// Without it the volume follows from where the boards of the laser plane's calibration stood.
+    /// The working volume; without it, it follows from the depths of the boards in the laser plane's calibration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub working_volume: Option<WorkingVolume>,
-    /// What every motion of the robot has to keep; without it nothing is moved.
+    /// The limits of every motion of the robot; without them nothing is moved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<Limits>,
-    /// What hangs on the controller's outputs.
+    /// The devices on the controller's outputs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outputs: Option<Outputs>,
-    /// The gripper's tool on the flange.
+    /// The pose of the gripper's tool on the flange.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tool: Option<ToolSpec>,
-    /// What of the sensor rides on the flange; without it the hand-eye calibration says where it is.
+    /// The sensor head on the flange; without it the hand-eye calibration gives its position.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub head: Option<HeadSpec>,
     /// How the stripe is found; docs/file-formats.md lists every key.
     pub extraction: crate::scan::Extraction,
 }
 
-/// Where the tool that inserts is.
+/// The pose of the inserting tool.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ToolSpec {
-    /// Flange from tool, 16 numbers row by row, mm. The tool's origin is what goes to the part's, its z points
+    /// Flange from tool, 16 numbers row by row, mm. The tool's origin goes to the part's origin; its z points
     /// against the insertion.
     pub flange_from_tool: Rigid<Flange, Tool>,
 }
@@ -56,28 +57,28 @@ pub struct ToolSpec {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeadSpec {
-    /// Its outermost points in the flange's frame, mm, at most 2000 from the flange: every motion keeps them slow and
-    /// out of keep-outs. None of them: nothing of the sensor rides on the flange.
+    /// Its outermost points in the flange's frame, mm, at most 2000 from the flange. Every motion limits their
+    /// speed and keeps them out of keep-outs. Empty: nothing of the sensor is on the flange.
     pub points_mm: Vec<[f64; 3]>,
 }
 
-/// Nothing on a flange reaches farther from it, mm.
+/// Largest accepted distance of a point from the flange, mm.
 const LEVER: f64 = 2000.0;
 
-/// Where parts can be: camera-frame depths between which the laser plane is believed.
+/// The range of parts: camera-frame depths between which the laser plane is accepted.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WorkingVolume {
     /// Nearest depth along the optical axis, mm, > 0.
     pub near_mm: f64,
-    /// Farthest depth, mm, > near. Pixels that see the sheet nearer or farther are not looked at.
+    /// Farthest depth, mm, > near. Pixels whose ray meets the sheet outside these depths are ignored.
     pub far_mm: f64,
 }
 
-/// No camera works at less than this, nor at more, mm.
+/// Smallest and largest accepted `far_mm`; values outside look like metres or micrometres.
 const METRES: f64 = 3.0;
 const MICROMETRES: f64 = 50_000.0;
-/// What work with a laser line tolerates, mm: from a micrometre to a hand's breadth.
+/// Accepted tolerance, mm: from a micrometre to a hand's breadth.
 const FINEST: f64 = 1e-3;
 const COARSEST: f64 = 100.0;
 
@@ -161,7 +162,7 @@ impl Settings {
         self.extraction.check()
     }
 
-    /// The depths that a person stated.
+    /// The stated depths.
     pub fn volume(&self) -> Option<Volume> {
         self.working_volume.map(|v| Volume::new(v.near_mm, v.far_mm, "station.toml"))
     }

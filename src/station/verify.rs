@@ -1,5 +1,5 @@
-//! In: a station, scans of a flat surface, scans of one object from several sides, touched points. Out: what the fits
-//! said and, apart from it, what checks with other data say.
+//! In: a station, scans of a flat surface, scans of one object from several sides, touched points. Out: the
+//! residuals of the fits and, separately, the results of checks with other data.
 //! Frame and unit: base frame; mm, px, degrees.
 
 use super::find::{different, fits};
@@ -14,12 +14,12 @@ use crate::scan::parts_for;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// What [`verify`] compares.
+/// The data that [`verify`] compares.
 #[derive(Clone, Debug, Default)]
 pub struct VerifyRun {
     /// Scan folders of one flat surface.
     pub flats: Vec<PathBuf>,
-    /// Shots that belong to one pose of a flat scan; 0: each scan is one view.
+    /// Number of shots of one pose in a flat scan; 0: each scan is one view.
     pub shots_per_view: u32,
     /// Scan folders of one object of any shape, from several sides.
     pub object: Vec<PathBuf>,
@@ -30,10 +30,10 @@ pub struct VerifyRun {
 /// How scans of one object agree.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct ObjectCheck {
-    /// By scan: its name, the share of its surfaces that the first scan saw too, and their distance from those, rms,
-    /// mm.
+    /// For each scan: its name, the share of its surfaces that the first scan saw too, and their rms distance from
+    /// those, mm.
     pub scans: Vec<(String, f64, f64)>,
-    /// Along the base's axes about the object's middle.
+    /// The disagreement along the base's axes about the object's middle.
     pub looks: Disagreement,
 }
 
@@ -44,14 +44,14 @@ pub struct CalibrationCheck {
     pub verdict: String,
     /// Residuals of the data that was fitted.
     pub fit: BTreeMap<String, f64>,
-    /// Errors on data that was left out of the fit, and the expected error.
+    /// Errors on data that was excluded from the fit, and the expected error.
     pub verification: BTreeMap<String, f64>,
 }
 
-/// What [`verify`] found.
+/// Result of [`verify`].
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct VerifyReport {
-    /// By name of the calibration, e.g. "laser plane".
+    /// Checks by name of the calibration, e.g. "laser plane".
     pub calibrations: BTreeMap<String, CalibrationCheck>,
     /// How the views of the flat surface agree; `None` where no flat scan was given.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -62,7 +62,7 @@ pub struct VerifyReport {
     /// How predicted and touched points agree; `None` where no file was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub touch: Option<TouchCheck>,
-    /// What the calibrations' own files say against them.
+    /// Warnings in the calibration files.
     pub remarks: Vec<String>,
 }
 
@@ -77,7 +77,7 @@ fn check<T>(c: &Calibration<T>) -> CalibrationCheck {
     }
 }
 
-/// Checks a station with data that its calibrations did not see.
+/// Checks a station with data that its calibrations did not use.
 pub fn verify(rig: &Rig, run: &VerifyRun) -> Result<VerifyReport> {
     let mut calibrations = BTreeMap::new();
     let mut add = |name: &str, c: Option<CalibrationCheck>| c.map(|c| calibrations.insert(name.to_owned(), c));
@@ -122,14 +122,15 @@ pub fn verify(rig: &Rig, run: &VerifyRun) -> Result<VerifyReport> {
     Ok(VerifyReport { calibrations, flat, object, touch, remarks })
 }
 
-/// Disagreement beyond so many standard deviations is a calibration's, the robot's or the object's that was moved.
+/// A disagreement of more than this many standard deviations comes from a calibration, the robot, or an object that
+/// was moved.
 const RATIO: f64 = 3.0;
 
-/// Registers the scans' surfaces and judges what they disagree about.
+/// Registers the scans' surfaces and judges their disagreement.
 fn object(rig: &Rig, folders: &[PathBuf]) -> Result<ObjectCheck> {
     different(folders)?;
     let mut scans = Vec::new();
-    // The scans of one object rest on the same parts of the rig: they have one fingerprint.
+    // The scans of one object use the same parts of the rig: they have one fingerprint.
     let mut rig = rig.clone();
     for folder in folders {
         let report = super::load_report(folder)?;
@@ -148,7 +149,7 @@ fn object(rig: &Rig, folders: &[PathBuf]) -> Result<ObjectCheck> {
 }
 
 impl ObjectCheck {
-    /// What explains a disagreement that is larger than expected.
+    /// The cause that best explains a disagreement that is larger than expected.
     fn remark(&self) -> Option<String> {
         let l = &self.looks;
         let best = l.explained_by.first().filter(|_| l.ratio > RATIO || l.misfit_sigmas > RATIO)?;

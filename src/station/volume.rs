@@ -1,5 +1,5 @@
-//! In: station.toml, the calibrations of a rig, what the command line states. Out: the depths in which points are
-//! believed and those at which calibrations are judged, each with its origin.
+//! In: station.toml, the calibrations of a rig, values from the command line. Out: the depths in which points are
+//! accepted and those at which calibrations are judged, each with its origin.
 //! Frame and unit: along the camera's optical axis, mm.
 
 use super::Settings;
@@ -7,7 +7,7 @@ use crate::calibrate::limits::Asked;
 use crate::fault::{Fault, Result};
 use crate::rig::{Rig, Volume};
 
-/// Where the laser plane was held by boards; `None` for an imported one.
+/// Depths in which boards determined the laser plane; `None` for an imported one.
 pub fn calibrated(rig: &Rig) -> Option<Volume> {
     let figures = &rig.laser_plane.as_ref()?.quality.figures;
     let at = |name: &str| figures.get(name).copied().filter(|z| *z > 0.0);
@@ -15,13 +15,14 @@ pub fn calibrated(rig: &Rig) -> Option<Volume> {
     (near < far).then(|| Volume::new(near, far, "where the laser plane's boards stood"))
 }
 
-/// Depths at which a scan's points are believed: those that station.toml states, else those of the laser plane's
-/// boards and as far again. `None`: nobody knows, every depth is believed.
+/// Depths at which a scan's points are accepted: those that station.toml states, else those of the laser plane's
+/// boards, extended ([`Volume::extended`]). `None`: unknown, every depth is accepted.
 pub fn believed(settings: &Settings, rig: &Rig) -> Option<Volume> {
     settings.volume().or_else(|| calibrated(rig).map(|v| v.extended()))
 }
 
-/// Where the camera looks at a surface squarely: the middle of the working volume, else where the sheet meets its axis.
+/// Depths of the square view of a surface: the working volume, else the depth where the sheet meets the camera's
+/// axis.
 pub fn view(settings: &Settings, rig: &Rig) -> Result<Volume> {
     if let Some(v) = settings.volume().or_else(|| calibrated(rig)) {
         return Ok(v);
@@ -36,7 +37,7 @@ pub fn view(settings: &Settings, rig: &Rig) -> Result<Volume> {
     Ok(Volume::new(z, z, "where the sheet meets the camera's axis"))
 }
 
-/// What is stated about judging a calibration: on the command line, else in station.toml.
+/// The stated values for judging a calibration: from the command line, else from station.toml.
 pub fn asked(settings: &Settings, stated: Option<[f64; 2]>) -> Asked {
     let working = stated.map(|[near, far]| Volume::new(near, far, "stated")).or_else(|| settings.volume());
     Asked { working, tolerance_mm: settings.tolerance_mm }

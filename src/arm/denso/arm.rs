@@ -1,5 +1,5 @@
 //! In: the address of a Denso controller (RC8). Out: its arm as a link that reads, moves, switches and halts.
-//! Frame and unit: mm and degrees on the wire, base_from_flange in mm here; tool 0 and work 0, or nothing is read.
+//! Frame and unit: mm and degrees on the wire, base_from_flange in mm here; tool 0 and work 0 are required.
 
 use super::halt::DensoHalt;
 use super::session::Session;
@@ -11,28 +11,28 @@ use crate::fault::{Kind, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use std::sync::Arc;
 
-/// Speed of the flange when all joints go at 100 %, mm/s: an upper bound for the VS-060 (joint 1 at 213.75 degrees a
-/// second, 0.92 m out).
+/// Speed of the flange when all joints run at 100 %, mm/s: an upper bound for the VS-060 (joint 1 at 213.75
+/// degrees/s, 0.92 m out).
 const JOINTS_FULL_MM_S: f64 = 3500.0;
-/// Turning rate of the flange then, degrees/s: the sum of the VS-060's joints, which no way of theirs exceeds.
+/// Turning rate of the flange then, degrees/s: the sum of the VS-060's joint rates, which no motion exceeds.
 const JOINTS_FULL_DEG_S: f64 = 1240.0;
-/// Slowest speed in per cent that is sent; below it controllers round to none.
+/// Slowest speed that is sent, %; controllers round smaller ones to zero.
 const LEAST_PERCENT: f64 = 0.1;
 
-/// Gentlest acceleration that is asked for, per cent.
+/// Smallest acceleration that is requested, %.
 const LEAST_RAMP: f32 = 5.0;
 
 /// Speeds of a straight motion at 100 %.
 #[derive(Clone, Copy, Debug)]
 pub struct Full {
-    /// Of the flange, mm/s.
+    /// Speed of the flange, mm/s.
     pub mm_s: f64,
-    /// Of its turn, degrees/s.
+    /// Turning rate of the flange, degrees/s.
     pub deg_s: f64,
 }
 
-/// A Denso arm: one connection for reading and moving, one that only halts; those that switch outputs are made as they
-/// are asked for.
+/// A Denso arm with one connection for reading and moving and one that only halts; connections that switch outputs
+/// are opened on request.
 pub struct Denso {
     name: String,
     address: String,
@@ -58,8 +58,8 @@ impl Denso {
         self.session.client.read(Call::ControllerGetVariable, self.session.controller, name)
     }
 
-    /// Share of the full speeds, %. On a straight way shift and turn end together: whichever takes longer sets the
-    /// time.
+    /// Share of the full speeds, %. On a straight path translation and turn end together: whichever takes longer
+    /// determines the time.
     fn percent(&self, way: Way, pace: &Pace) -> f64 {
         let share = match way {
             Way::Straight => (pace.flange_mm_s / self.full.mm_s).max(pace.turn_deg_s / self.full.deg_s),
@@ -159,8 +159,8 @@ impl Arm for Denso {
     fn make(&mut self, allowed: Allowed) -> Result<()> {
         let motion = allowed.motion();
         let percent = self.percent(motion.way, allowed.pace()) as f32;
-        // Left to itself a controller takes the square of the speed, with which steps of less than a millimetre take
-        // as long as they are many: 0.25 % at 50 mm/s.
+        // By default a controller uses the square of the speed (0.25 % at 50 mm/s). Steps of less than a millimetre
+        // then take as long as steps of many millimetres.
         let ramps = (2.0 * percent).clamp(LEAST_RAMP, 100.0);
         self.session.execute("ExtSpeed", Variant::F32s(vec![percent, ramps, ramps]))?;
         let way = Variant::I32(if motion.way == Way::Straight { 2 } else { 1 });
@@ -184,7 +184,7 @@ impl Arm for Denso {
 
 impl Drop for Denso {
     fn drop(&mut self) {
-        // Whoever held the arm lets others have it; the controller does the same when the connection ends.
+        // Releases the arm for other programs; the controller does the same when the connection ends.
         let _ = self.give();
     }
 }

@@ -1,4 +1,4 @@
-//! In: the wish to stop. Out: Halt over a connection of its own, which no motion blocks and which does not hold the
+//! In: a request to stop. Out: Halt over a separate connection, which no motion blocks and which does not hold the
 //! arm.
 //! Frame and unit: none.
 

@@ -8,7 +8,7 @@ use crate::bcap::{Call, Client, ClientOptions, Handle, Network, Outcome, Variant
 use crate::fault::{Fault, Result};
 use std::time::Instant;
 
-/// Errors that are read out of a controller's list; more say nothing more.
+/// Most errors that are read from a controller's list; further ones add nothing.
 const MOST_ERRORS: i32 = 10;
 
 /// One connection to a controller.
@@ -16,7 +16,7 @@ pub struct Session {
     pub client: Client,
     pub controller: Handle,
     pub robot: Handle,
-    /// The controller tells its own time with a pose.
+    /// The controller sends its own time with a pose.
     timed: bool,
 }
 
@@ -38,18 +38,18 @@ impl Session {
         self.client.execute(self.robot, command, argument).map_err(|e| self.in_its_words(e))
     }
 
-    /// `None` where the controller does not know the command.
+    /// Executes a command; `None` if the controller does not know it.
     pub fn try_execute(&mut self, command: &str, argument: Variant) -> Result<Option<Variant>> {
         let request = vec![self.robot.into(), Variant::Text(command.into()), argument.clone()];
         match self.client.call(Call::RobotExecute, request)? {
             Ok(value) => Ok(Some(value)),
             Err(Outcome::UNKNOWN_COMMAND | Outcome::NOT_IMPLEMENTED) => Ok(None),
-            // Asked again for the fault in words.
+            // Executed again, to get the fault in words.
             Err(_) => self.execute(command, argument).map(Some),
         }
     }
 
-    /// A whole number that a command answers; `None` where there is no such command.
+    /// The whole number that a command answers; `None` if the controller does not know the command.
     pub fn number(&mut self, command: &str) -> Result<Option<i32>> {
         Ok(self.try_execute(command, Variant::Empty)?.and_then(|v| v.as_f64()).map(|x| x as i32))
     }
@@ -59,7 +59,7 @@ impl Session {
         self.client.ask(Call::ControllerExecute, request).map_err(|e| e.at(command))
     }
 
-    /// The errors that stand on the controller, in its own words.
+    /// The errors that are active on the controller, in its own words.
     pub fn errors(&mut self) -> Result<Vec<ControllerError>> {
         let count = self.controller_execute("GetCurErrorCount", Variant::Empty)?.as_f64().unwrap_or(0.0) as i32;
         let mut errors = Vec::new();
@@ -76,7 +76,7 @@ impl Session {
         Ok(errors)
     }
 
-    /// An input or an output.
+    /// The state of an input or output.
     pub fn signal(&mut self, number: u16) -> Result<bool> {
         let value = self.client.read(Call::ControllerGetVariable, self.controller, &format!("IO{number}"))?;
         value.as_f64().map(|x| x != 0.0).ok_or_else(|| {

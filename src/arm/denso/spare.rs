@@ -1,4 +1,5 @@
-//! A connection to a Denso controller beside the one that moves: what fails over it is asked once more over a new one.
+//! A second connection to a Denso controller besides the one that moves; a request that fails is repeated over a
+//! new one.
 
 use super::session::Session;
 use crate::arm::Switch;
@@ -6,10 +7,11 @@ use crate::bcap::{Call, ClientOptions, Variant};
 use crate::fault::Result;
 use std::time::Duration;
 
-/// A controller that has not answered by then is asked again over a new connection.
+/// A controller that has not answered within this time is asked again over a new connection.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Such a connection. TCP: over UDP Denso's service answers one call after the other, these after a motion.
+/// Such a connection, over TCP: over UDP Denso's service answers calls one after the other, and would answer these
+/// only after a motion.
 pub struct Spare {
     address: String,
     session: Option<Session>,
@@ -20,7 +22,7 @@ impl Spare {
         Ok(Spare { address: address.to_owned(), session: Some(connect(address)?) })
     }
 
-    /// Asks; what is asked must bear to be done twice.
+    /// Asks; the request must be safe to execute twice.
     pub fn ask<T>(&mut self, question: impl Fn(&mut Session) -> Result<T>) -> Result<T> {
         if let Some(session) = self.session.as_mut()
             && let Ok(answer) = question(session)

@@ -1,4 +1,4 @@
-//! In: poses, codes and texts. Out: how the controller writes them, and what its answers mean.
+//! In: poses, codes and texts. Out: how the controller writes them, and the meaning of its answers.
 //! Frame and unit: mm and degrees, Denso's X Y Z RX RY RZ and figure.
 
 use crate::bcap::Variant;
@@ -13,7 +13,7 @@ pub fn position(pose: &Rigid<Base, Flange>) -> Variant {
     Variant::F64s(numbers)
 }
 
-/// What `OutRange` says about a pose that is not 0.
+/// The meaning of an `OutRange` answer other than 0.
 pub fn out_of_range(code: i64) -> String {
     match code {
         -1 => "no joint angles lead there: out of reach".into(),
@@ -26,12 +26,12 @@ pub fn out_of_range(code: i64) -> String {
     }
 }
 
-/// A controller's text without what would steer a terminal.
+/// A controller's text without control characters, which could steer a terminal; at most 200 characters.
 pub fn plain(text: &str) -> String {
     text.chars().filter(|c| !c.is_control()).take(200).collect()
 }
 
-/// The seven numbers of a position and its figure.
+/// A pose and its figure from the seven numbers of a position.
 pub fn read_position(numbers: &[f64]) -> Result<(Rigid<Base, Flange>, Option<i32>)> {
     let pose = Convention::Denso.read(numbers.get(..6).unwrap_or(numbers))?;
     Ok((pose, numbers.get(6).map(|f| *f as i32)))

@@ -1,24 +1,25 @@
-//! Whether the controller's time runs as this machine's does: the speed of the arm is measured by it; s.
+//! Checks that the controller's clock runs at the rate of this machine's, because the arm's speed is measured with
+//! it; s.
 
 use super::super::TimedPose;
 use std::time::{Duration, Instant};
 
-/// A second of the controller's lasts between half and twice as long here (as for lines of poses, `capture::pair`):
-/// another rate means another unit, or stamps that stand still.
+/// Allowed rate of the controller's clock: half to twice that of this machine's, as for lines of poses in
+/// `capture::pair`. Another rate means another unit, or stamps that do not advance.
 pub const RATE: (f64, f64) = (0.5, 2.0);
-/// Rates are judged over at least this time: stamps are whole milliseconds, and poses as old as a cycle of the
-/// controller.
+/// Rates are judged over at least this time: stamps are whole milliseconds, and a pose may be one controller cycle
+/// old.
 pub const RATE_SPAN: Duration = Duration::from_millis(100);
 
-/// Compares the stamps of poses with when they were asked for and when they were here.
+/// Compares the stamps of poses with the times of their requests and answers.
 #[derive(Debug, Default)]
 pub struct Clocks {
     since: Option<(Instant, Instant, f64)>,
 }
 
 impl Clocks {
-    /// Why the controller's stamps cannot be believed. How long the answers took does not matter: a pose was read
-    /// between question and answer, and only a rate that no moment between them explains is wrong.
+    /// The reason why the controller's stamps cannot be trusted. The duration of the answers does not matter: a
+    /// pose was read between request and answer, and only a rate that no moment between them explains is wrong.
     pub fn judge(&mut self, pose: &TimedPose) -> Option<String> {
         let device = pose.device?.as_secs_f64();
         let Some((asked, here, before)) = self.since else {
@@ -31,7 +32,7 @@ impl Clocks {
         }
         let most = pose.here.saturating_duration_since(asked).as_secs_f64();
         let (passed, least) = (device - before, least.as_secs_f64());
-        // Where answers take long the time since is known badly: it is taken over longer.
+        // Slow answers leave the elapsed time uncertain: it is then measured over a longer span.
         if most < 2.0 * least {
             self.since = Some((pose.asked, pose.here, device));
         }
@@ -66,7 +67,7 @@ mod tests {
     #[test]
     fn stamps_in_another_unit_or_standing_still_are_seen_and_slow_answers_are_not() {
         for answer_ms in [1, 30, 700] {
-            // Whole milliseconds, a cycle of 8 ms.
+            // Stamps in whole milliseconds, from a controller cycle of 8 ms.
             assert_eq!(judged(|t| (t * 125.0).floor() / 125.0, answer_ms), None);
             assert_eq!(judged(|t| 40.0 + 1.4 * t, answer_ms), None);
             for wrong in [0.0, 1e-3, 0.3, 1e3] {

@@ -1,4 +1,4 @@
-//! Whether docs/robots.md states the numbers that the rules keep.
+//! Tests that docs/robots.md states the numbers that the rules use.
 
 use super::limits::{Limits, MOST_SPEED_MM_S};
 use super::{clocks, gates, standing, tolerances, watch};

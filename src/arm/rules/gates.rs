@@ -1,5 +1,5 @@
-//! In: a plan, the limits, the robot as it is now. Out: every gate with its number and its limit. Pure.
-//! Frame and unit: base frame; mm, mm/s, degrees, s; gates of yes and no have 1 and 0.
+//! In: a plan, the limits, the robot's current situation. Out: every gate with its number and its limit. Pure.
+//! Frame and unit: base frame; mm, mm/s, degrees, s; yes-or-no gates have 1 and 0.
 
 use super::super::{Mode, Motion, State};
 use super::carried::Carried;
@@ -10,31 +10,32 @@ use super::straight::Straight;
 use crate::fault::Gate;
 use crate::geometry::{Base, Flange, Rigid};
 
-/// The robot as it is now.
+/// The robot's current situation.
 #[derive(Clone, Debug)]
 pub struct Situation {
     /// Mode, motor, errors, frames.
     pub state: State,
-    /// Where it stands.
+    /// Current pose of the flange.
     pub at: Rigid<Base, Flange>,
-    /// With which figure, where the controller says it.
+    /// Its figure, if the controller reports one.
     pub figure: Option<i32>,
-    /// It may be moved: `--allow-motion` was given and it was armed.
+    /// Motion is permitted: `--allow-motion` was given and the robot was armed.
     pub armed: bool,
-    /// A motion was stopped and nobody has looked at the robot since.
+    /// A motion was stopped and no person has looked at the robot since.
     pub unknown: bool,
 }
 
-/// Largest departure of a rotation from orthonormal that is believed.
+/// Largest orthonormality error of a rotation matrix that is accepted.
 const ORTHONORMAL: f64 = 1e-6;
 
-/// No leg is slower, mm/s: below it an arm that moves cannot be told from one that stands.
+/// Slowest speed of a leg, mm/s: below it a moving arm cannot be distinguished from one at rest.
 pub const SLOWEST_MM_S: f64 = 0.1;
-/// A way is looked at in turns of at most so much, rad: a point 300 mm off the flange passes 0.02 mm from the chord
-/// of such a turn.
+/// A path is checked in pieces that turn by at most this angle, rad. A point 300 mm off the flange deviates by 0.02
+/// mm from the chord of such a piece.
 const PIECE: f64 = 0.02;
 
-/// How far a matrix is from a rotation; infinite where a number is.
+/// Orthonormality error of a pose's rotation; infinite if a number is not finite or the determinant is not
+/// positive.
 fn departure(pose: &Rigid<Base, Flange>) -> f64 {
     let r = &pose.rotation;
     let off = (r.transpose() * r - crate::geometry::Mat3::identity()).norm();
@@ -42,7 +43,7 @@ fn departure(pose: &Rigid<Base, Flange>) -> f64 {
     if finite && r.determinant() > 0.0 { off } else { f64::INFINITY }
 }
 
-/// Yes and no as a gate.
+/// A yes-or-no condition as a gate.
 fn must(name: &'static str, yes: bool) -> Gate {
     Gate::least(name, f64::from(u8::from(yes)), 1.0)
 }
@@ -54,7 +55,7 @@ pub fn gates(plan: &Plan, limits: &Limits, carried: &Carried, now: &Situation) -
         let mut most = 0f64;
         for leg in &plan.legs {
             let value = of(&from, leg);
-            // Not a number is the worst of all.
+            // NaN counts as the worst value.
             most = if value.is_nan() { f64::INFINITY } else { most.max(value) };
             from = leg.to;
         }
@@ -85,7 +86,7 @@ fn slowest(plan: &Plan) -> f64 {
     speeds.fold(f64::INFINITY, f64::min)
 }
 
-/// How much of the way of the flange and of all that it carries lies in keep-outs, mm.
+/// The length of the path inside keep-outs, mm: the largest over the flange and all that it carries.
 fn kept_out(carried: &Carried, limits: &Limits, from: &Rigid<Base, Flange>, to: &Rigid<Base, Flange>) -> f64 {
     let way = Straight::new(from, to);
     let pieces = (way.turn.norm() / PIECE).ceil().clamp(1.0, 200.0) as usize;
@@ -97,12 +98,12 @@ fn kept_out(carried: &Carried, limits: &Limits, from: &Rigid<Base, Flange>, to: 
     carried.points().map(through).fold(0.0, f64::max)
 }
 
-/// Whether a straight way ends inside the workspace and keeps out of the keep-outs.
+/// Whether a straight path ends inside the workspace and avoids the keep-outs.
 pub fn free(carried: &Carried, limits: &Limits, from: &Rigid<Base, Flange>, to: &Rigid<Base, Flange>) -> bool {
     limits.workspace.outside(&to.translation) <= 0.0 && kept_out(carried, limits, from, to) <= 0.0
 }
 
-/// What mode, motor, errors and frames have to be before anything moves.
+/// The conditions on mode, motor, errors and frames for any motion.
 pub fn of_the_state(state: &State) -> Vec<Gate> {
     let zero = |n: Option<i32>| n.map_or(f64::INFINITY, |n| f64::from(n.abs()));
     vec![
@@ -120,7 +121,7 @@ fn of_the_evidence(plan: &Plan, limits: &Limits) -> Vec<Gate> {
     let mut out = Vec::new();
     let evidence = &plan.evidence;
     if let Some(normal) = &evidence.normal {
-        // The flange looks against the normal.
+        // The flange's z axis points against the normal.
         let tilt = |leg: &Motion| (-leg.to.rotation.column(2).dot(normal)).clamp(-1.0, 1.0).acos().to_degrees();
         let worst = plan.legs.iter().map(|leg| if tilt(leg).is_nan() { f64::INFINITY } else { tilt(leg) });
         out.push(Gate::most("tilt to the measured normal, degrees", worst.fold(0.0, f64::max), limits.max_tilt_deg));
@@ -129,7 +130,7 @@ fn of_the_evidence(plan: &Plan, limits: &Limits) -> Vec<Gate> {
         out.push(must("scan of this calibration", station == scan));
     }
     if let Some(age) = evidence.scan_age_s {
-        // A scan of the future is as old as none.
+        // A scan dated in the future is refused like one that is too old.
         out.push(Gate::most("age of the scan, s", if age >= 0.0 { age } else { f64::INFINITY }, limits.max_scan_age_s));
     }
     out.extend(evidence.measured.iter().cloned());

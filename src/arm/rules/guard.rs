@@ -1,5 +1,5 @@
-//! In: plans and confirmations. Out: motions, each allowed, watched and logged; after one that was stopped nothing
-//! moves until somebody has looked at the robot.
+//! In: plans and confirmations. Out: motions, each allowed, watched and logged. After a motion that was stopped
+//! nothing moves until a person has looked at the robot.
 //! Frame and unit: base_from_flange, mm, degrees, mm/s.
 
 use super::super::{Allowed, Arm, Halt, Motion, PoseSource, Reach, TimedPose, Way};
@@ -26,23 +26,23 @@ pub struct Guard {
     carried: Carried,
     log: MotionLog,
     armed: Option<Armed>,
-    /// Why nobody knows where the arm is.
+    /// Why the arm's pose is unknown.
     unknown: Option<String>,
     used: BTreeSet<String>,
     proposed: u64,
     stop: StopButton,
 }
 
-/// What an armed robot has: a way to stop it and a way to watch it, each over its own connection.
+/// What an armed robot has: a way to stop it and a way to watch it, each over a separate connection.
 struct Armed {
     halt: Arc<dyn Halt>,
     poses: Box<dyn PoseSource>,
-    /// The link says that there is no arm: a simulated controller's time is its own.
+    /// The link reports that the controller is simulated: its clock does not follow this machine's.
     simulated: bool,
 }
 
 impl Guard {
-    /// Read-only. Without limits it cannot be armed. What the flange carries is judged in every motion.
+    /// A read-only guard. Without limits it cannot be armed. The carried points are judged in every motion.
     pub fn new(link: Box<dyn Arm>, limits: Option<Limits>, carried: Carried, log: MotionLog) -> Guard {
         Guard {
             link,
@@ -57,12 +57,12 @@ impl Guard {
         }
     }
 
-    /// The link, for reading. It moves nothing by itself: a motion needs what only this guard makes.
+    /// The link, for reading. It cannot move the arm: a motion needs an [`Allowed`], which only this guard makes.
     pub fn link(&mut self) -> &mut dyn Arm {
         &mut *self.link
     }
 
-    /// What stops it from any thread.
+    /// The button that stops the arm from any thread.
     pub fn stop_button(&self) -> StopButton {
         self.stop.clone()
     }
@@ -72,16 +72,16 @@ impl Guard {
         self.armed.is_some()
     }
 
-    /// What every motion has to keep.
+    /// The limits of every motion.
     pub fn limits(&self) -> Option<&Limits> {
         self.limits.as_ref()
     }
 
-    /// Takes the arm for motions: opens the connections that stop it and watch it. `allowed` is the operator's
-    /// --allow-motion.
+    /// Takes control of the arm for motions and opens the connections that stop it and watch it. `allowed` is the
+    /// operator's --allow-motion.
     ///
     /// # Errors
-    /// It was not allowed, no limits are stated, the link only reads, another program has the arm.
+    /// Motion was not allowed, no limits are stated, the link only reads, or another program holds the arm.
     pub fn arm(&mut self, allowed: bool) -> Result<()> {
         if !allowed {
             return Err(Fault::refused(format!("{}: read-only", self.link.name()))
@@ -100,27 +100,27 @@ impl Guard {
         Ok(())
     }
 
-    /// Gives the arm back.
+    /// Returns control of the arm.
     pub fn disarm(&mut self) -> Result<()> {
         self.armed = None;
         self.link.give()
     }
 
-    /// Whether a straight way keeps inside the workspace and out of the keep-outs, with all that the flange carries.
-    /// Nothing is asked of the robot; without limits no way is free.
+    /// Whether a straight path stays inside the workspace and out of the keep-outs, with all that the flange
+    /// carries. The robot is not asked. Without limits the answer is false.
     pub fn keeps_clear(&self, from: &Rigid<Base, Flange>, to: &Rigid<Base, Flange>) -> bool {
         self.limits.as_ref().is_some_and(|limits| free(&self.carried, limits, from, to))
     }
 
-    /// A person has looked at the robot after a motion that was stopped, and said so: no program says it by itself.
-    /// The pose is read anew.
+    /// Reports that a person has looked at the robot after a stopped motion; no program may report it on its own.
+    /// Reads the pose again.
     pub fn looked(&mut self) -> Result<TimedPose> {
         let pose = self.link.pose()?;
         self.unknown = None;
         Ok(pose)
     }
 
-    /// Why nobody knows where the arm is; `None` where it is known.
+    /// Why the arm's pose is unknown; `None` if it is known.
     pub fn unknown(&self) -> Option<&str> {
         self.unknown.as_deref()
     }
@@ -131,7 +131,7 @@ impl Guard {
         Ok(Situation { state, at, figure, armed: self.armed.is_some(), unknown: self.unknown.is_some() })
     }
 
-    /// Looks at a plan from where the arm stands now. The proposal shows every gate, met or not.
+    /// Examines a plan from the arm's current pose. The proposal shows every gate, met or not.
     ///
     /// # Errors
     /// The robot cannot be asked, or no limits are stated.
@@ -160,7 +160,8 @@ impl Guard {
             now.state.errors.iter().map(|e| format!("on the controller stands {:08X} {}", e.code, e.text)).collect();
         reasons.extend(self.unknown.clone());
         reasons.extend(self.stop.why());
-        // A plan that cannot be a pose is not shown to the controller. Along straight legs its ends stand for the rest.
+        // A plan that fails a gate is not shown to the controller. On a straight row the ends, and some legs
+        // between, are checked.
         if gates.iter().all(|g| g.passed) {
             let mut answered = 0;
             for leg in ends(&now.at, &plan.legs) {
@@ -179,12 +180,13 @@ impl Guard {
         Ok(Judged { gates, reasons, unjudged })
     }
 
-    /// Makes a plan that was confirmed, once. `each` is called after each leg, the arm standing still, with the leg's
-    /// number; its error ends the plan there.
+    /// Executes a confirmed plan, once. `each` is called after each leg with the leg's number while the arm stands
+    /// still; its error ends the plan there.
     ///
     /// # Errors
-    /// A gate is not met (any more), the confirmation is of another proposal, was used or is too old, the controller
-    /// would not begin a leg, or the motion was stopped: then the arm stands wherever it was stopped.
+    /// A gate is not met (any more); the confirmation is of another proposal, was used or is too old; the
+    /// controller refused to begin a leg; or the motion was stopped. In the last case the arm stands wherever it
+    /// was stopped.
     pub fn make(
         &mut self,
         proposal: &Proposal,
@@ -194,11 +196,12 @@ impl Guard {
         self.attempt(proposal, confirmation, each)?.map_or(Ok(()), Err)
     }
 
-    /// The same for who has another way: a leg that the controller would not begin comes back as what it said. The
-    /// arm then stands where that leg was to begin, its place is known, and something else may be proposed.
+    /// The same for callers that have an alternative: if the controller refuses to begin a leg, its refusal is
+    /// returned. The arm then stands where that leg was to begin, its pose is known, and another motion may be
+    /// proposed.
     ///
     /// # Errors
-    /// All others of [`Guard::make`].
+    /// All other errors of [`Guard::make`].
     pub fn attempt(
         &mut self,
         proposal: &Proposal,
@@ -210,7 +213,7 @@ impl Guard {
             return Err(fault);
         }
         self.used.insert(confirmation.hash);
-        // What is begun stands in the log before it begins.
+        // The log states what is begun before it begins.
         self.log.note("begun", proposal, vec![])?;
         let made = self.run(proposal, each);
         match &made {
@@ -277,7 +280,7 @@ impl Guard {
         refused(missed.join("; "), "a condition named above is not met")
     }
 
-    /// What the controller said where it would not begin a leg.
+    /// Executes the legs. Returns the controller's refusal if it did not begin a leg.
     fn run(
         &mut self,
         proposal: &Proposal,
@@ -313,7 +316,7 @@ impl Guard {
             made
         });
         match watch.halted() {
-            // Every error but that of a watch that could not begin halts.
+            // Every error halts, except that of a watch that could not start.
             None => made,
             Some(why) => {
                 self.unknown = Some(format!("the last motion was stopped: {why}"));
@@ -323,7 +326,8 @@ impl Guard {
     }
 }
 
-/// Ends the watch with the motion, also where a bug ends it: its threads would be waited for without end, a laser on.
+/// Ends the watch with the motion, also if a panic ends it: otherwise its threads would be joined forever with a
+/// laser on.
 struct Ended<'w, 'a>(&'w Watch<'a>);
 
 impl Drop for Ended<'_, '_> {
@@ -341,7 +345,7 @@ impl Drop for Guard {
     }
 }
 
-/// What was found of a plan.
+/// The result of judging a plan.
 struct Judged {
     gates: Vec<Gate>,
     reasons: Vec<String>,
@@ -351,8 +355,7 @@ struct Judged {
 /// Number of legs within a row whose reach the controller is asked about, besides the row's two ends.
 const ASKED: usize = 8;
 
-/// The poses for which the controller is asked: those where a plan's way bends, and some of those in the middle of a
-/// straight row.
+/// The poses for which the controller is asked: those where a plan's path bends, and some within a straight row.
 fn ends<'a>(from: &Rigid<Base, Flange>, legs: &'a [Motion]) -> impl Iterator<Item = &'a Motion> {
     let stride = (legs.len() / ASKED).max(1);
     let from = *from;
@@ -366,7 +369,7 @@ fn ends<'a>(from: &Rigid<Base, Flange>, legs: &'a [Motion]) -> impl Iterator<Ite
     legs.iter().enumerate().filter(move |(k, _)| k % stride == 0 || bends(*k)).map(|(_, leg)| leg)
 }
 
-/// Makes a plan's legs up to one that the controller would not begin; what it said of that one.
+/// Executes a plan's legs up to one that the controller refuses to begin; returns that refusal.
 fn all(
     link: &mut dyn Arm,
     plan: &Plan,
@@ -394,13 +397,13 @@ fn all(
     Ok(None)
 }
 
-/// An order that was answered with an error, read again: the arm is ready as before it and stands where it stood, so
-/// nothing was begun. Everything else is an error: nobody knows what the arm does.
+/// Checks an order that was answered with an error. If the arm is ready as before and has not moved, nothing was
+/// begun and the refusal is returned. In every other case the arm's action is unknown, which is an error.
 fn not_begun(link: &mut dyn Arm, before: &TimedPose, fault: Fault) -> Result<Fault> {
     if fault.kind != Kind::Refused {
         return Err(fault);
     }
-    // The state first: an arm that starts after it is seen by its pose.
+    // The state is read first: an arm that starts after that is detected by its pose.
     let ready = of_the_state(&link.state()?).iter().all(|gate| gate.passed);
     let (angle, mm) = before.base_from_flange.difference(&link.pose()?.base_from_flange);
     if !(ready && mm <= STILL.0 && angle.to_degrees() <= STILL.1) {
@@ -411,7 +414,7 @@ fn not_begun(link: &mut dyn Arm, before: &TimedPose, fault: Fault) -> Result<Fau
         .next("reach the pose from another start, or in several motions"))
 }
 
-/// Looks where the arm has come to.
+/// Checks where the arm has arrived.
 fn arrived(link: &mut dyn Arm, leg: &Motion, before: &TimedPose) -> Result<()> {
     let after = link.pose()?;
     let (angle, mm) = after.base_from_flange.difference(&leg.to);

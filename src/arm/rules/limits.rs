@@ -1,12 +1,12 @@
-//! In: the table `[motion]` of station.toml. Out: what every motion has to keep.
+//! In: the table `[motion]` of station.toml. Out: the limits of every motion.
 //! Frame and unit: base frame; mm, mm/s, degrees, degrees/s, s.
 
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec3;
 
-/// No carried point is faster, whatever is asked for, mm/s: ISO 10218-1:2011, 5.6.2, under reduced speed control the
-/// speed of the tool centre point is at most this. It is no reduced speed control in that standard's sense: that has
-/// to be the controller's own.
+/// Upper limit of the speed of any carried point, mm/s, whatever is requested. ISO 10218-1:2011, 5.6.2: under
+/// reduced speed control the speed of the tool centre point is at most this. It does not replace the reduced speed
+/// control of that standard, which has to be the controller's own.
 pub const MOST_SPEED_MM_S: f64 = 250.0;
 
 /// A box, base frame, mm.
@@ -20,7 +20,8 @@ pub struct Space {
 }
 
 impl Space {
-    /// How far a place is outside, mm; 0 inside, infinite where a number is none: `max` passes such numbers over.
+    /// Distance of a point outside the box, mm; 0 inside, infinite if a coordinate is NaN, which `max` would
+    /// ignore.
     pub fn outside(&self, p: &Vec3) -> f64 {
         if p.iter().any(|x| x.is_nan()) {
             return f64::INFINITY;
@@ -28,7 +29,7 @@ impl Space {
         (0..3).map(|k| (self.from_mm[k] - p[k]).max(p[k] - self.to_mm[k]).max(0.0)).fold(0.0, f64::max)
     }
 
-    /// How much of a straight way lies inside, mm.
+    /// Length of a straight segment inside the box, mm.
     pub fn inside_of(&self, a: &Vec3, b: &Vec3) -> f64 {
         let (way, mut enter, mut leave) = (b - a, 0f64, 1f64);
         for k in 0..3 {
@@ -41,18 +42,19 @@ impl Space {
             let (x, y) = ((self.from_mm[k] - a[k]) / way[k], (self.to_mm[k] - a[k]) / way[k]);
             (enter, leave) = (enter.max(x.min(y)), leave.min(x.max(y)));
         }
-        // A way that only touches has no length inside, a place that does not move has none either.
+        // A segment that only touches the box has no length inside, and neither has a point that does not move:
+        // both count as 1e-6.
         if leave < enter { 0.0 } else { ((leave - enter) * way.norm()).max(1e-6) }
     }
 }
 
-/// What every motion has to keep.
+/// The limits of every motion.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
-    /// Where the flange may be.
+    /// Allowed space of the flange's origin.
     pub workspace: Space,
-    /// Where nothing may be that the flange carries, nor the flange.
+    /// Spaces that neither the flange nor anything that it carries may enter.
     #[serde(default)]
     pub keep_out: Vec<Space>,
     /// Speed of the fastest of flange, tool's tip and sensor head, mm/s, 1 to 250.
@@ -64,22 +66,24 @@ pub struct Limits {
     /// Largest turn of a single motion, degrees, 1 to 180.
     #[serde(default = "turn")]
     pub max_turn_deg: f64,
-    /// Greatest turning rate of the flange, degrees/s, 1 to 180: it bounds what nobody has described.
+    /// Greatest turning rate of the flange, degrees/s, 1 to 180: it also bounds the speed of parts that nobody has
+    /// described.
     #[serde(default = "turning")]
     pub max_turn_deg_s: f64,
-    /// Largest angle between the flange's axis and the measured normal, where one was measured, degrees, 0.1 to 60.
+    /// Largest angle between the flange's axis and the measured normal, if one was measured, degrees, 0.1 to 60.
     #[serde(default = "tilt")]
     pub max_tilt_deg: f64,
-    /// Oldest scan that a motion may rest on, s, 1 to 86400.
+    /// Greatest age of a scan that a motion is based on, s, 1 to 86400.
     #[serde(default = "age")]
     pub max_scan_age_s: f64,
-    /// A confirmation holds so long after the pose was shown, s, 1 to 600.
+    /// How long a confirmation is valid after the pose was shown, s, 1 to 600.
     #[serde(default = "shown")]
     pub max_shown_s: f64,
-    /// Poses that do not come for so long while the arm moves stop it, ms, 50 to 5000.
+    /// Longest time without a pose while the arm moves; a longer silence stops it; ms, 50 to 5000.
     #[serde(default = "silence")]
     pub max_silence_ms: f64,
-    /// A pose that does not change for so long on the way stops the motion, ms, 200 to 5000.
+    /// Longest time for which the pose may stay unchanged during a motion before the motion is stopped, ms, 200 to
+    /// 5000.
     #[serde(default = "still")]
     pub max_still_ms: f64,
 }
@@ -113,7 +117,7 @@ fn still() -> f64 {
 }
 
 impl Limits {
-    /// The usual limits within a space.
+    /// The default limits within a space.
     pub fn within(workspace: Space) -> Limits {
         Limits {
             workspace,
@@ -130,7 +134,7 @@ impl Limits {
         }
     }
 
-    /// Refuses numbers out of the ranges that the fields state.
+    /// Refuses numbers outside the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         let ranges = [
             ("speed_mm_s", self.speed_mm_s, 1.0, MOST_SPEED_MM_S),

@@ -1,11 +1,12 @@
-//! In: what was asked of the arm and what became of it. Out: a line of JSON each, on the disk before anything moves.
+//! In: what was requested of the arm and its outcome. Out: one line of JSON for each, on disk before anything
+//! moves.
 //! Frame and unit: base_from_flange as 16 numbers, mm; mm/s; times UTC.
 
 use super::plan::Proposal;
 use crate::fault::Result;
 use std::path::{Path, PathBuf};
 
-/// The log of a robot's motions; lines are only ever added.
+/// The log of a robot's motions; lines are only appended.
 #[derive(Clone, Debug, Default)]
 pub struct MotionLog {
     path: Option<PathBuf>,
@@ -29,7 +30,7 @@ struct Line<'a> {
 }
 
 impl MotionLog {
-    /// In a file.
+    /// A log that is written to a file.
     pub fn file(path: &Path) -> MotionLog {
         MotionLog { path: Some(path.to_owned()) }
     }
@@ -39,7 +40,7 @@ impl MotionLog {
         crate::files::append_line(path, &serde_json::to_string(line).expect("plain data"))
     }
 
-    /// Something happened to a proposal: asked, refused, begun, done, halted.
+    /// Logs an event of a proposal: asked, refused, begun, not begun, done, stopped.
     pub fn note(&self, event: &str, of: &Proposal, reasons: Vec<String>) -> Result<()> {
         let asked = event == "asked";
         let plan = &of.plan;

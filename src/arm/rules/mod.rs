@@ -1,7 +1,7 @@
-//! In: motions that someone asks for, the robot's state, a person's confirmation. Out: motions that were allowed,
-//! made once, watched while they are made; a log of all that was asked and made, with its reason.
-//! Frame and unit: base frame; mm, degrees; docs/robots.md has the rules. No safety device: that stays with the
-//! controller.
+//! In: requested motions, the robot's state, a person's confirmation. Out: allowed motions, each executed once and
+//! watched meanwhile; a log of all requests and motions with their reasons.
+//! Frame and unit: base frame; mm, degrees. docs/robots.md has the rules. This is not a safety device: that remains
+//! the controller's task.
 
 mod carried;
 mod clocks;

@@ -1,4 +1,4 @@
-//! How fast the flange goes and turns along a leg, so that no carried point is faster than the leg states; mm/s,
+//! Speed and turning rate of the flange along a leg, so that no carried point is faster than the leg states; mm/s,
 //! degrees/s.
 
 use super::super::{Motion, Pace, Way};
@@ -7,12 +7,12 @@ use super::limits::Limits;
 use super::straight::Straight;
 use crate::geometry::{Base, Flange, Rigid};
 
-/// The pace of a leg that begins at `from`. Its fastest point has the leg's speed; where that turns the flange faster
-/// than the limit, everything goes slower together.
+/// The pace of a leg that begins at `from`. Its fastest point has the leg's speed. Where the flange would then turn
+/// faster than the limit, speed and turning rate are reduced together.
 pub fn pace(from: &Rigid<Base, Flange>, leg: &Motion, carried: &Carried, limits: &Limits) -> Pace {
     let lever_mm = carried.lever_mm();
     if leg.way == Way::Joint {
-        // The controller chooses the way: its link has to keep both for any of them.
+        // The controller chooses the path: its link has to keep both limits for any path.
         return Pace { flange_mm_s: leg.speed_mm_s, turn_deg_s: limits.max_turn_deg_s, lever_mm };
     }
     let way = Straight::new(from, &leg.to);

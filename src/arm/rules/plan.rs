@@ -1,4 +1,4 @@
-//! In: legs that belong together, and what they rest on. Out: a plan with a hash, which a person confirms.
+//! In: legs that belong together, and their evidence. Out: a plan with a hash, which a person confirms.
 //! Frame and unit: base_from_flange, mm; mm/s.
 
 use super::super::Motion;
@@ -8,16 +8,16 @@ use crate::geometry::{Base, Flange, Rigid, Vec3};
 use sha2::{Digest, Sha256};
 use std::time::Instant;
 
-/// What a motion rests on beside the robot itself.
+/// What a motion is based on besides the robot itself.
 #[derive(Clone, Debug, Default)]
 pub struct Evidence {
-    /// Of the surface that is worked on: unit length, away from it; base frame.
+    /// Unit normal of the surface that is worked on, pointing away from it; base frame.
     pub normal: Option<Vec3>,
     /// Fingerprint of the station's calibration, and of the calibration that the scan was made with.
     pub fingerprints: Option<(String, String)>,
-    /// Since the scan, s.
+    /// Time since the scan, s.
     pub scan_age_s: Option<f64>,
-    /// What was measured, each with its limit: score, second best, sigma against tolerance.
+    /// Measured values with their limits: score, second best, sigma against tolerance.
     pub measured: Vec<Gate>,
 }
 
@@ -26,38 +26,38 @@ pub struct Evidence {
 pub struct Plan {
     /// One or two words.
     pub name: String,
-    /// Why, in a sentence.
+    /// The reason, in one sentence.
     pub why: String,
-    /// One after the other; each begins where the one before ends.
+    /// The legs in order; each begins where the one before ends.
     pub legs: Vec<Motion>,
-    /// What it rests on.
+    /// What the plan is based on.
     pub evidence: Evidence,
 }
 
 impl Plan {
-    /// One motion that rests on nothing but the robot.
+    /// One motion that is based on nothing but the robot.
     pub fn single(name: &str, why: impl Into<String>, leg: Motion) -> Plan {
         Plan { name: name.into(), why: why.into(), legs: vec![leg], evidence: Evidence::default() }
     }
 }
 
-/// A plan that was looked at: its gates, and the hash that a confirmation has to name.
+/// A plan that was examined: its gates, and the hash that a confirmation has to name.
 #[derive(Clone, Debug)]
 pub struct Proposal {
-    /// What is to be done.
+    /// The plan.
     pub plan: Plan,
-    /// From where.
+    /// Pose of the flange where it starts.
     pub from: Rigid<Base, Flange>,
-    /// The arm's figure there, where the controller says it.
+    /// The arm's figure there, if the controller reports it.
     pub figure: Option<i32>,
-    /// What it has to keep, all of it.
+    /// All gates that the plan has to meet.
     pub gates: Vec<Gate>,
-    /// Why it cannot be made where a gate has no words of its own (reach, controller's errors).
+    /// Reasons against the motion that no gate expresses (reach, controller's errors).
     pub reasons: Vec<String>,
-    /// What nobody has judged, in words: no gate stands for it, and whoever confirms has to know.
+    /// What was not judged, in words: no gate covers it, and the person who confirms has to know.
     pub unjudged: Vec<String>,
-    /// Names this proposal and no other: its poses, speeds, reason and evidence, what the flange carries, and its
-    /// number.
+    /// Identifies this proposal and no other: poses, speeds, reason, evidence, carried points and number of the
+    /// proposal.
     pub hash: String,
     pub(super) shown: Instant,
 }
@@ -73,14 +73,14 @@ impl Proposal {
     }
 }
 
-/// A person's yes to one proposal. Used up by the motion.
+/// A person's confirmation of one proposal. The motion consumes it.
 #[derive(Debug)]
 pub struct Confirmation {
     pub(super) hash: String,
 }
 
 impl Confirmation {
-    /// The yes to the proposal of that hash, as it was shown.
+    /// Confirms the proposal of that hash as it was shown.
     pub fn of(hash: impl Into<String>) -> Confirmation {
         Confirmation { hash: hash.into() }
     }
@@ -100,7 +100,7 @@ pub fn hash(plan: &Plan, carried: &Carried, from: &Rigid<Base, Flange>, number: 
     [station, scan].into_iter().for_each(&mut text);
     evidence.measured.iter().for_each(|gate| text(gate.name));
     carried.unknown().iter().for_each(|why| text(why));
-    // Of each list its length first: no number can pass for one of another list.
+    // Each list is preceded by its length, so that no number can count as one of another list.
     let mut numbers = |list: &[f64]| {
         sha.update((list.len() as u64).to_le_bytes());
         list.iter().for_each(|x| sha.update(x.to_bits().to_le_bytes()));

@@ -1,4 +1,5 @@
-//! Whether an arm that was told to move stands still, or its poses do; mm, degrees, ms.
+//! Detects an arm that was ordered to move but stands still, or whose reported poses do not change; mm, degrees,
+//! ms.
 
 use super::super::TimedPose;
 use super::carried::Carried;
@@ -6,20 +7,20 @@ use super::tolerances::{ARRIVED, STILL};
 use crate::geometry::{Base, Flange, Rigid};
 use std::time::{Duration, Instant};
 
-/// From the order to the first movement an arm may take so long, or as long as it may stand on its way where that is
-/// more: the controller plans the way and lets go of the brakes.
+/// Longest time from the order to the first movement: the controller plans the path and releases the brakes. Where
+/// the allowed standstill on the path is longer, that applies instead.
 pub const START: Duration = Duration::from_millis(1000);
 
-/// The leg that is under way.
+/// The leg that is being executed.
 #[derive(Clone, Copy, Debug)]
 pub struct Leg {
-    /// Where to.
+    /// Target pose.
     pub to: Rigid<Base, Flange>,
-    /// When it was ordered.
+    /// Time of the order.
     pub ordered: Instant,
 }
 
-/// Where it was when it moved last.
+/// The pose at which the arm last moved.
 #[derive(Debug, Default)]
 pub struct Standing {
     since: Option<Since>,
@@ -33,10 +34,10 @@ struct Since {
 }
 
 impl Standing {
-    /// Why the arm ought to be moving and is not seen to. A pose has changed where a carried point lies more than
-    /// 0.01 mm or the flange 0.005 degrees from where it was: the slowest leg, 0.1 mm/s, does three times that in 300
-    /// ms. The time has to pass by this machine's clock and by the controller's: a simulated one may stand still.
-    /// Within its goal's tolerance an arm may stand: it settles there.
+    /// The reason if the arm ought to move and its pose does not change. A pose has changed where a carried point
+    /// lies more than 0.01 mm, or the flange 0.005 degrees, from where it was. The slowest leg, 0.1 mm/s, moves
+    /// three times that far in 300 ms. The time has to pass both on this machine's clock and on the controller's: a
+    /// simulated clock may stand still. Within its goal's tolerance an arm may stand: it settles there.
     pub fn judge(&mut self, pose: &TimedPose, leg: Option<&Leg>, carried: &Carried, most: Duration) -> Option<String> {
         let Some(leg) = leg else {
             self.since = None;
@@ -47,7 +48,7 @@ impl Standing {
         };
         let begun = self.since.as_ref().filter(|s| s.ordered == leg.ordered);
         let Some(since) = begun else {
-            // The first pose of this leg: asked for after the order, it is where the arm began, or near it.
+            // The first pose of this leg was requested after the order: it is where the arm began, or near it.
             self.since =
                 (pose.asked >= leg.ordered).then_some(Since { ordered: leg.ordered, pose: *pose, moved: false });
             return None;
@@ -79,11 +80,12 @@ mod tests {
     use super::*;
     use crate::geometry::{Vec3, exp};
 
-    /// Poses every 4 ms of a leg along x that follows `mm`; the lever is `lever` mm. Why it is halted, and when, s.
+    /// Poses every 4 ms of a leg along x that follows `mm`; the lever is `lever` mm. Returns the time of the halt,
+    /// s, and its reason.
     fn judged(mm: impl Fn(f64) -> f64, deg: impl Fn(f64) -> f64, lever: f64, goal: f64) -> Option<(f64, String)> {
         let carried = Carried::new(Some(Vec3::new(lever, 0.0, 0.0)), Ok(vec![]));
         let pose = |t: f64| {
-            // Controllers state micrometres.
+            // Controllers report poses to a micrometre.
             let x = (mm(t) * 1e3).round() * 1e-3;
             let turn = Vec3::z() * deg(t).to_radians();
             Rigid::<Base, Flange>::new(exp(&turn), Vec3::new(x, 0.0, 400.0))
@@ -103,7 +105,7 @@ mod tests {
     fn what_stands_on_its_way_is_seen_and_the_slowest_leg_is_not_halted() {
         let still = |_: f64| 0.0;
         assert_eq!(judged(|t| 0.1 * t, still, 0.0, 100.0), None, "0.1 mm/s");
-        // 0.1 mm/s of a point 300 mm out, and the flange does not shift.
+        // A turn that moves a point 300 mm out at 0.1 mm/s, while the flange's origin rests.
         assert_eq!(judged(still, |t| 0.1 / 300.0_f64.to_radians() * t, 300.0, 100.0), None);
         assert_eq!(judged(|t| 20.0 * (t - 0.9).max(0.0), still, 0.0, 100.0), None, "it begins late");
         assert_eq!(judged(|t| 20.0 * t.min(1.0), still, 0.0, 1.0), None, "it waits at its goal");

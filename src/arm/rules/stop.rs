@@ -1,4 +1,4 @@
-//! In: a pressed button, a signal, a lease that ran out. Out: whether the arm has to stop, and why.
+//! In: a pressed button, a signal, an expired lease. Out: whether the arm has to stop, and why.
 //! Frame and unit: times of this machine.
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,22 +8,22 @@ use std::time::{Duration, Instant};
 #[derive(Default)]
 struct Inside {
     pressed: AtomicBool,
-    /// Why, where it was not the button itself.
+    /// The reason, if it was not the button itself.
     reason: Mutex<Option<String>>,
     signals: Mutex<Vec<Arc<AtomicBool>>>,
     lease: Mutex<Option<(Instant, Duration)>>,
 }
 
-/// What stops a motion from any thread. All clones are one button.
+/// Stops a motion from any thread. All clones share one button.
 #[derive(Clone, Default)]
 pub struct StopButton(Arc<Inside>);
 
 impl StopButton {
-    /// Stops what moves; nothing moves until [`StopButton::release`].
+    /// Stops any motion; nothing moves until [`StopButton::release`].
     pub fn press(&self) {
         self.0.pressed.store(true, Ordering::SeqCst);
     }
-    /// The same for another reason, which is said then; the first one stands.
+    /// The same with a reason, which is then reported; the first reason is retained.
     pub fn press_for(&self, why: &str) {
         self.0.reason.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| why.to_owned());
         self.press();
@@ -33,21 +33,21 @@ impl StopButton {
         *self.0.reason.lock().unwrap_or_else(PoisonError::into_inner) = None;
         self.0.pressed.store(false, Ordering::SeqCst);
     }
-    /// Counts a flag as pressed while it is up: Ctrl-C.
+    /// Registers a flag (Ctrl-C) that counts as a pressed button while it is set.
     pub fn listen(&self, flag: Arc<AtomicBool>) {
         self.0.signals.lock().unwrap_or_else(PoisonError::into_inner).push(flag);
     }
-    /// From now on somebody has to say at least so often that he is still there.
+    /// From now on the operator has to call [`StopButton::renew`] at least this often.
     pub fn lease(&self, every: Duration) {
         *self.lock() = Some((Instant::now(), every));
     }
-    /// He is still there.
+    /// Renews the lease: the operator is still present.
     pub fn renew(&self) {
         if let Some((since, _)) = self.lock().as_mut() {
             *since = Instant::now();
         }
     }
-    /// Nobody has to.
+    /// Ends the lease: no renewal is required any more.
     pub fn end_lease(&self) {
         *self.lock() = None;
     }
@@ -56,7 +56,7 @@ impl StopButton {
         self.0.lease.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Why nothing may move; `None` where it may.
+    /// The reason why nothing may move; `None` if motion is allowed.
     pub fn why(&self) -> Option<String> {
         if self.0.pressed.load(Ordering::SeqCst) {
             let reason = self.0.reason.lock().unwrap_or_else(PoisonError::into_inner).clone();

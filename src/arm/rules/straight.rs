@@ -1,27 +1,27 @@
-//! A straight way of the flange that turns evenly, and how fast what rides on the flange moves along it; base frame,
-//! mm, rad.
+//! A straight path of the flange with a constant turning rate, and the speed of the points on the flange along it;
+//! base frame, mm, rad.
 
 use crate::geometry::{Base, Flange, Rigid, Vec3, exp, log};
 
-/// The way from one pose to another.
+/// The path from one pose to another.
 #[derive(Clone, Debug)]
 pub struct Straight {
     from: Rigid<Base, Flange>,
     to: Rigid<Base, Flange>,
-    /// Of the flange's origin, mm.
+    /// Translation of the flange's origin, mm.
     pub shift: Vec3,
-    /// About which axis and how far, rad.
+    /// Rotation vector of the whole path: the axis times the angle, rad.
     pub turn: Vec3,
 }
 
 impl Straight {
-    /// The way between two poses.
+    /// The path between two poses.
     pub fn new(from: &Rigid<Base, Flange>, to: &Rigid<Base, Flange>) -> Straight {
         let turn = log(&(to.rotation * from.rotation.transpose()));
         Straight { from: *from, to: *to, shift: to.translation - from.translation, turn }
     }
 
-    /// The pose after a share of the way, 0 to 1.
+    /// The pose after a share of the path, 0 to 1.
     pub fn at(&self, share: f64) -> Rigid<Base, Flange> {
         if share == 1.0 {
             return self.to;
@@ -29,10 +29,12 @@ impl Straight {
         Rigid::new(exp(&(self.turn * share)) * self.from.rotation, self.from.translation + self.shift * share)
     }
 
-    /// Greatest speed of a point of the flange's frame, mm for each whole way in a unit of time.
+    /// Greatest speed of a point of the flange's frame along the path, in mm per unit of time if the whole path
+    /// takes one unit.
     ///
-    /// The point moves with `shift + turn x q`, where `q` turns about the axis. The square of that is a constant and
-    /// a cosine of the angle that was turned: it is greatest where the cosine peaks, or at an end.
+    /// The point moves with `shift + turn x q`, where `q` turns about the axis. The square of its speed is a
+    /// constant plus a cosine of the angle turned so far: the speed is greatest where the cosine peaks, or at an
+    /// end.
     pub fn fastest(&self, point: &Vec3) -> f64 {
         let angle = self.turn.norm();
         if angle == 0.0 {
@@ -65,7 +67,7 @@ mod tests {
             let shift = Vec3::new(w(1.7, 0.2), w(0.3, 0.5), w(2.9, 0.6)) * 200.0;
             let to = Rigid::new(exp(&turn) * from.rotation, from.translation + shift);
             let (way, point) = (Straight::new(&from, &to), Vec3::new(w(5.1, 0.1), w(4.7, 0.2), w(3.3, 0.9)) * 300.0);
-            // Central differences at places on the way and at its ends.
+            // Central differences at points along the path and at its ends.
             let (n, h) = (2000, 1e-6);
             let at = |share: f64| way.at(share).point(&point);
             let speed =

@@ -1,5 +1,5 @@
-//! In: a motion under way, poses over a connection of its own, the stop button. Out: a Halt over the second
-//! connection as soon as one of them says so, and why.
+//! In: a motion under way, poses over a separate connection, the stop button. Out: a Halt over a further connection
+//! as soon as poses or button require it, and the reason.
 //! Frame and unit: base frame; mm, mm/s; ms.
 
 use super::super::{Halt, PoseSource, TimedPose};
@@ -13,34 +13,35 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How often is looked whether the arm has to stop.
+/// How often stop button and silence are checked.
 pub const LOOK: Duration = Duration::from_millis(2);
-/// How often a pose is read.
+/// Pause between two readings of the pose.
 const READ: Duration = Duration::from_millis(4);
-/// Speeds are taken over at least this time, s: controllers state theirs in whole milliseconds.
+/// Speeds are averaged over at least this time, s: controllers report their time in whole milliseconds.
 pub const SPAN_S: f64 = 0.04;
-/// Measured speeds may be above the confirmed one by this share and this much, mm/s: noise of readings (0.01 mm in
-/// [`SPAN_S`] is 0.25 mm/s), ramps, a stamp that is late by a cycle of 8 ms.
+/// Measured speeds may exceed the confirmed one by this factor and this amount, mm/s. The reasons are noise of
+/// readings (0.01 mm in [`SPAN_S`] is 0.25 mm/s), ramps, and stamps that are late by a cycle of 8 ms.
 pub const SPEED_SLACK: (f64, f64) = (1.25, 10.0);
 /// The same for turning rates, degrees/s.
 pub const TURN_SLACK: (f64, f64) = (1.25, 2.0);
-/// A flange this far outside the workspace has left it, mm: a straight way bends by less on a controller that keeps it.
+/// A flange this far outside the workspace has left it, mm: a controller that keeps a straight path deviates by
+/// less.
 pub const OUTSIDE_MM: f64 = 1.0;
 
-/// What was confirmed and has to stay so on the way.
+/// What was confirmed and has to hold during the motion.
 #[derive(Clone, Copy, Debug)]
 pub struct Confirmed {
     /// Greatest speed of any carried point, mm/s.
     pub speed_mm_s: f64,
     /// Greatest turning rate, degrees/s.
     pub turn_deg_s: f64,
-    /// The figure that has to stay, where the controller says it and the way is straight.
+    /// The figure that has to remain, if the controller reports it and the path is straight.
     pub figure: Option<i32>,
-    /// A simulated controller's time is its own, faster or slower than this machine's.
+    /// The controller is simulated: its clock may run faster or slower than this machine's.
     pub simulated: bool,
 }
 
-/// What a watch shares with the motion that it watches.
+/// The state that a watch shares with its motion.
 pub struct Watch<'a> {
     pub limits: &'a Limits,
     pub carried: &'a Carried,
@@ -48,14 +49,14 @@ pub struct Watch<'a> {
     halt: &'a dyn Halt,
     confirmed: Confirmed,
     over: AtomicBool,
-    /// The leg that is under way.
+    /// The leg that is being executed.
     leg: Mutex<Option<Leg>>,
-    /// When a pose was read last.
+    /// Time of the last pose that was read.
     heard: Mutex<Instant>,
     why: Mutex<Option<String>>,
 }
 
-/// What the poses before said.
+/// State carried from earlier poses.
 #[derive(Default)]
 struct Seen {
     before: Option<(f64, Rigid<Base, Flange>)>,
@@ -81,7 +82,7 @@ impl<'a> Watch<'a> {
         *self.leg.lock().unwrap_or_else(PoisonError::into_inner) = Some(Leg { to, ordered: Instant::now() });
     }
 
-    /// The leg has ended: until the next one the arm may stand.
+    /// The leg has ended: the arm may stand until the next one.
     pub fn arrived(&self) {
         *self.leg.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
@@ -91,12 +92,12 @@ impl<'a> Watch<'a> {
         self.over.store(true, Ordering::SeqCst);
     }
 
-    /// Why it was halted.
+    /// The reason of the halt; `None` if there was none.
     pub fn halted(&self) -> Option<String> {
         self.why.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Halts, once, and keeps the reason; what the Halt itself said is part of it.
+    /// Halts, once, and stores the reason; an error of the Halt itself is added to it.
     pub fn halt(&self, why: String) {
         let mut held = self.why.lock().unwrap_or_else(PoisonError::into_inner);
         if held.is_none() {
@@ -108,7 +109,7 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Looks at the stop button and at the silence of the link until the motion ends.
+    /// Checks the stop button and the silence of the link until the motion ends.
     pub fn guard(&self) {
         let silence = Duration::from_secs_f64(self.limits.max_silence_ms * 1e-3);
         while !self.over.load(Ordering::SeqCst) && self.halted().is_none() {
@@ -126,7 +127,7 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Reads poses until the motion ends; one that is not as it has to be halts it.
+    /// Reads poses until the motion ends; a pose that breaks a rule halts it.
     pub fn follow(&self, poses: &mut dyn PoseSource) {
         let (mut seen, begun) = (Seen::default(), Instant::now());
         while !self.over.load(Ordering::SeqCst) && self.halted().is_none() {
@@ -160,7 +161,7 @@ impl<'a> Watch<'a> {
         clocks.or(standing).or_else(|| self.too_fast(pose, &mut seen.before, begun))
     }
 
-    /// Speeds by the controller's clock where it has one, else by the moments of the poses.
+    /// Checks speeds by the controller's clock if it reports one, else by [`TimedPose::moment`].
     fn too_fast(
         &self,
         pose: &TimedPose,

@@ -1,5 +1,5 @@
-//! In: a robot and a camera on their wires, a board below them. Out: the station's whole rig, by moves of the
-//! program's choice.
+//! In: a connected robot and camera, a board below them. Out: the station's whole rig, by moves that the program
+//! chooses.
 //! Frame and unit: mm, mm/s.
 
 use super::joint::finish;

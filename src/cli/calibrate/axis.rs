@@ -1,4 +1,5 @@
-//! In: a recording of a board that rides on a linear axis or turntable. Out: its direction and pitch, or its axis.
+//! In: a recording of a board that is mounted on a linear axis or turntable. Out: its direction and pitch, or its
+//! axis.
 //! Frame and unit: camera frame; mm, rad a count.
 
 use super::store::{Keep, finish};

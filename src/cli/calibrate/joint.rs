@@ -70,7 +70,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     Ok(())
 }
 
-/// Stores all records, or none where they are badly determined.
+/// Stores all records, or none if they are badly determined.
 pub(super) fn finish(station: &Path, result: &JointResult, keep: &Keep, console: &Console) -> Result<()> {
     let q = &result.quality;
     if q.verdict >= Verdict::BadlyDetermined && !keep.badly_determined() {

@@ -1,5 +1,5 @@
-//! In: a recording of a part that was passed to and fro, paired by clock. Out: by how much pictures are late against
-//! poses, stored in the station.
+//! In: a recording of a part that was passed back and forth, paired by clock. Out: the delay of pictures relative
+//! to poses, stored in the station.
 //! Frame and unit: ms.
 
 use crate::cli::terminal::console::Console;

@@ -1,4 +1,4 @@
-//! Reads the option that says where the camera is mounted.
+//! Parses the option for the camera's mount.
 
 use crate::calibrate::hand_eye::options::Mount;
 use crate::cli::terminal::console::Console;
@@ -16,7 +16,7 @@ pub struct Where {
 }
 
 impl Where {
-    /// The station's mount; what was assumed is said.
+    /// The station's mount; an assumption is reported.
     pub fn of(&self, station: &Path, settings: &Settings, console: &Console) -> Result<Mount> {
         let mounted = mount_of(station, settings, self.mount)?;
         mounted.assumed.iter().for_each(|why| console.say(why));

@@ -57,7 +57,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         return put_to_the_test(args, transform, &options, console);
     }
     let station = args.station.as_deref().expect("clap: required without --evaluate");
-    // The result may be the first that the station gets.
+    // The result may be the first content of the station.
     let settings = if station.exists() { Settings::load(station)? } else { Settings::default() };
     let working = args.working_mm.map(|mm| Volume::new(mm, mm, "stated"));
     let asked = Asked { working, tolerance_mm: settings.tolerance_mm };

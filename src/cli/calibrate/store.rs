@@ -1,5 +1,4 @@
-//! In: a calibration and its page. Out: both stored in the station, or refused where it is badly determined; what is
-//! said of it.
+//! In: a calibration and its page. Out: both stored in the station, or refused if badly determined; a summary.
 //! Frame and unit: none.
 
 use crate::calibrate::report::Page;
@@ -18,14 +17,14 @@ pub struct Keep {
 }
 
 impl Keep {
-    /// Whether such a result is stored too.
+    /// Whether a badly determined result is stored too.
     pub fn badly_determined(&self) -> bool {
         self.keep_badly_determined
     }
 }
 
-/// Stores a calibration and its page beside it, and says what it came to. A badly determined one is refused:
-/// the station keeps its former calibration, the page says what was found.
+/// Stores a calibration and its page and reports the result. A badly determined one is refused: the station keeps
+/// its present calibration, and the page shows the result.
 pub fn finish<T: Serialize + Measured>(
     station: &Path,
     calibration: &Calibration<T>,
@@ -67,7 +66,7 @@ pub fn finish<T: Serialize + Measured>(
     Ok(())
 }
 
-/// Says which of a station's calibrations are of no use since it has another camera.
+/// Reports which of a station's calibrations are invalid because it has another camera.
 pub(in crate::cli) fn stale(station: &Path, console: &Console) {
     match Rig::load(station).and_then(|rig| rig.belong_together()) {
         Ok(()) => {}
@@ -75,7 +74,7 @@ pub(in crate::cli) fn stale(station: &Path, console: &Console) {
     }
 }
 
-/// How well a result fits, how it predicts what it did not see, and how well it is known: a line each.
+/// Residuals of the fit, errors on excluded data and expected errors, one a line.
 pub fn figures(q: &Quality) -> String {
     let mut text = String::new();
     for (head, keys) in [

@@ -1,5 +1,5 @@
-//! In: a camera. Out: what cameras there are, what one can be set to, one picture with what it shows, the exposure
-//! that suits the stripe.
+//! In: a camera. Out: the list of cameras, a camera's features, one picture with its findings, the exposure that
+//! suits the stripe.
 //! Frame and unit: features by the standard names (SFNC); px, us.
 
 use crate::capture::{CameraUri, PictureSource, RawFormat, Value, fresh, look, tune, unexposed};
@@ -86,7 +86,7 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Set { key, value, named } => set(key, value, named, console),
         Command::Snap { out, named, station } => snap(out, named, station.as_deref(), console),
         Command::Tune(named) => {
-            // Before it waits for a picture.
+            // Checked before waiting for a picture.
             if let CameraUri::Folder { path, .. } = &named.camera {
                 return Err(unexposed(&path.display().to_string()));
             }
@@ -140,7 +140,7 @@ fn set(key: &str, value: &str, named: &Named, console: &Console) -> Result<()> {
     let mut source = named.open(console)?;
     source.set(key, value)?;
     let now = source.features()?.into_iter().find(|f| f.name == key);
-    // A camera from before the standard's second version calls it otherwise.
+    // Cameras from before the standard's second version use another name.
     let shown = now.as_ref().and_then(|f| f.value.as_ref()).map_or("set".into(), |v| format!("is {v}"));
     console.result(&now, &format!("{key} {shown}"));
     Ok(())
@@ -160,7 +160,7 @@ fn snap(out: &Path, named: &Named, station: Option<&Path>, console: &Console) ->
     Ok(())
 }
 
-/// Draws the stripe as it is found.
+/// Draws the stripe as the station's extraction finds it.
 fn stripe(out: &Path, image: Image, station: &Path) -> Result<String> {
     let (settings, rig) = (Settings::load(station)?, Rig::load(station)?);
     let format = crate::capture::Format::of(&image);

@@ -1,5 +1,5 @@
-//! In: the words of the command line about cameras and what moves. Out: streams, recordings, features.
-//! Frame and unit: as the options say.
+//! In: command-line options for cameras and what moves. Out: streams, recordings, features.
+//! Frame and unit: stated by the options.
 
 pub mod camera;
 pub mod options;

@@ -1,4 +1,4 @@
-//! In: --camera, --pair and what belongs to them. Out: a stream of shots; what a person should hear of it meanwhile.
+//! In: --camera, --pair and related options. Out: a stream of shots, and messages about it.
 //! Frame and unit: mm, degrees, counts; s.
 
 use super::readout::ReadoutArgs;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How pictures and what moves are brought together.
+/// How pictures are paired with the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
 #[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Pair {
@@ -126,7 +126,7 @@ impl Running {
         Feed::start(self.named()?.open(raw)?, options)
     }
 
-    /// The camera that is named.
+    /// The camera of the options.
     pub fn named(&self) -> Result<&CameraUri> {
         self.camera.as_ref().ok_or_else(|| {
             Fault::usage("no camera is named")
@@ -134,7 +134,7 @@ impl Running {
         })
     }
 
-    /// Who tells a person, and the metrics' file, what happens.
+    /// Reports events to a person and to the metrics file.
     pub fn teller(&self) -> Teller {
         Teller { news: Arc::default(), metrics: self.metrics.clone(), last: Instant::now(), line: Arc::default() }
     }
@@ -146,13 +146,13 @@ fn seconds(option: &str, value: f64) -> Result<Duration> {
 }
 
 impl Capture {
-    /// What moves; none where pictures are paired with nothing.
+    /// What moves; `None` if pictures are not paired.
     pub fn motion(&self) -> Option<Motion> {
         let mut motion = self.motion.0.clone();
         if self.pair() == Pair::None {
             return None;
         }
-        // What a played recording or a simulated station says of itself.
+        // A played recording or a simulated station states its motion itself.
         match (&self.running.camera, self.pair()) {
             (Some(CameraUri::Play { path, .. }), Pair::Given) => {
                 motion = crate::recording::Recording::open(path).ok()?.meta.motion();
@@ -176,7 +176,7 @@ impl Capture {
         self.pair.unwrap_or(Pair::None)
     }
 
-    /// Opens camera and poses. `poses` is a pose file, by number; `station` knows the latency.
+    /// Opens camera and poses. `poses` is a pose file, paired by number; `station` gives the latency.
     pub fn open(
         &self,
         raw: Option<RawFormat>,
@@ -192,7 +192,7 @@ impl Capture {
         Ok(Stream::new(feed, way))
     }
 
-    /// Whose pictures, and against whose poses.
+    /// The source of the pictures, and that of their poses.
     pub fn sources(&self, feed: &Feed) -> Sources {
         Sources { camera: feed.device().into(), poses: self.pose_stream.as_ref().map(PoseUri::to_string) }
     }
@@ -236,7 +236,7 @@ impl Capture {
     }
 }
 
-/// Gathers on any thread what is to be told; the thread that holds the console tells it.
+/// Collects messages on any thread; the thread that owns the console prints them.
 #[derive(Clone)]
 pub struct Teller {
     news: Arc<Mutex<Vec<String>>>,
@@ -248,7 +248,7 @@ pub struct Teller {
 const EVERY: Duration = Duration::from_secs(1);
 
 impl Teller {
-    /// Takes in news, and the account once a second.
+    /// Takes in a message of the stream, and the account once a second.
     pub fn hear(&mut self, stream: &Stream, said: Option<String>) {
         if let Some(said) = said {
             self.news.lock().unwrap_or_else(PoisonError::into_inner).push(said);
@@ -260,12 +260,12 @@ impl Teller {
         self.account(stream);
     }
 
-    /// The account as it is now.
+    /// Takes in the present account.
     pub fn account(&mut self, stream: &Stream) {
         self.show(stream.feed(), "");
     }
 
-    /// The account of a feed once a second, `with` something before it.
+    /// Reports the account of a feed once a second, preceded by `with`.
     pub fn watch(&mut self, feed: &Feed, with: impl FnOnce() -> String) {
         if self.last.elapsed() >= EVERY {
             self.last = Instant::now();
@@ -273,7 +273,7 @@ impl Teller {
         }
     }
 
-    /// The account of a feed that has ended.
+    /// Reports the final account of a feed.
     pub fn last_word(&mut self, feed: &Feed) {
         self.show(feed, "");
     }
@@ -290,7 +290,7 @@ impl Teller {
         }
     }
 
-    /// Tells what was gathered.
+    /// Prints what was collected.
     pub fn tell(&self, console: &Console, bar: &ProgressBar) {
         let news = std::mem::take(&mut *self.news.lock().unwrap_or_else(PoisonError::into_inner));
         news.iter().for_each(|n| bar.suspend(|| console.warn(n)));

@@ -1,4 +1,4 @@
-//! A person's word for how pictures were read from the sensor, where neither camera nor recording says so.
+//! The readout of pictures from the sensor as a person states it, if neither camera nor recording states it.
 
 use crate::camera::Readout;
 
@@ -33,7 +33,7 @@ impl std::str::FromStr for Corner {
 }
 
 impl ReadoutArgs {
-    /// What was said; none where nothing was.
+    /// The stated readout; `None` if nothing was stated.
     pub fn stated(&self) -> Option<Readout> {
         if self.same_view {
             return Some(Readout { same_view: true, ..Readout::default() });

@@ -1,4 +1,4 @@
-//! In: a running camera, a station. Out: its scan, recorded beside or not.
+//! In: a running camera, a station. Out: its scan, with or without a recording.
 //! Frame and unit: as `sheetlight scan`.
 
 use super::options::{Capture, Teller};
@@ -15,21 +15,21 @@ use indicatif::ProgressBar;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-/// What is asked of a running camera and of what moves.
+/// Options for a running camera and its motion.
 pub struct Taken<'a> {
     pub capture: &'a Capture,
     /// Frames on standard input.
     pub raw: Option<RawFormat>,
     pub poses: Option<&'a Path>,
     pub station: &'a Path,
-    /// Where it is recorded too.
+    /// Folder of the recording, if it is recorded too.
     pub keep: Option<&'a Path>,
-    /// The picture with the laser off, of the camera's size.
+    /// The picture with the laser off; it must have the camera's size.
     pub ambient: &'a dyn Fn(Format) -> Result<Option<Image>>,
 }
 
-/// Scans a camera while it runs. With `keep` it is recorded there, and what cannot be scanned in time waits on that
-/// disk.
+/// Scans a camera while it runs. With `keep` the pictures are recorded there, and those that cannot be scanned in
+/// time wait on disk.
 pub fn scan_camera(
     &Taken { capture, raw, poses, station, keep, ambient }: &Taken<'_>,
     rig: &Rig,
@@ -44,7 +44,7 @@ pub fn scan_camera(
     if options.resume {
         return Err(Fault::usage("a camera cannot be resumed").next("record it (--record FOLDER): recordings can"));
     }
-    // A camera's Ctrl-C ends the stream; the scan of what came goes on to its end.
+    // Ctrl-C ends the camera's stream; the scan of the pictures so far continues to its end.
     let mut stream = capture.open(raw, poses, Some(station), Mode::All)?;
     let options = &ScanOptions {
         motion: motion.clone(),
@@ -83,7 +83,7 @@ pub fn scan_camera(
     let source = RecordedSource::new(keep.to_owned(), meta, backlog, report.clone());
     let scanned =
         crate::station::scan("camera", &name, |_| Ok(Box::new(source) as Box<dyn Source>), rig, options, progress);
-    // Where the scan failed, recording goes on until the stream ends: pictures cannot be taken again.
+    // If the scan failed, recording continues until the stream ends: the pictures cannot be taken again.
     thread.join().map_err(|_| Fault::device("the recorder ended in a panic").next("report it as a bug"))?;
     teller.tell(console, bar);
     let recorded = report.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take();

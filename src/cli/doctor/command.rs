@@ -1,5 +1,5 @@
-//! In: this machine. Out: its adapters, every stage compared with its CPU twin, transfer rates, the time of a shot,
-//! and a plain verdict, each as soon as it is known.
+//! In: this machine. Out: its adapters, every stage compared with its CPU counterpart, transfer rates, the time of
+//! a shot, and a verdict; each is printed as soon as it is known.
 //! Frame and unit: words that differ, or the stage's own measure; GB/s, ms.
 
 use super::trial;
@@ -34,12 +34,12 @@ struct Findings {
     program: String,
     adapters: Vec<AdapterInfo>,
     used: Option<String>,
-    /// Its stages read arrays as texels.
+    /// The adapter's stages read arrays as texels.
     reads_texels: bool,
     no_device_because: Option<String>,
     stages: Vec<StageFinding>,
     rates: Option<Rates>,
-    /// The whole chain on this machine's processor, and on the adapter.
+    /// Times of the whole chain on this machine's processor and on the adapter.
     ways: Vec<WayTime>,
     verdict: String,
 }
@@ -75,7 +75,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
 }
 
 impl Findings {
-    /// Notes what was tried, and says it.
+    /// Stores the result of a trial and reports it.
     fn take(&mut self, event: Event, console: &Console) {
         match event {
             Event::Device { name, reads_texels } if self.used.is_none() => {

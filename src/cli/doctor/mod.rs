@@ -1,4 +1,4 @@
-//! In: this machine. Out: what its adapters can do, each stage tried in a process with limits.
+//! In: this machine. Out: the capabilities of its adapters; each stage is tried in a process with limits.
 //! Frame and unit: none.
 
 pub mod command;

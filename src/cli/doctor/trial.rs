@@ -1,5 +1,5 @@
-//! In: the stages. Out: how each does on this machine's adapter, tried in a process of its own: a driver that does
-//! not come back, takes all memory or ends the process costs one stage, not the check.
+//! In: the stages. Out: the result of each on this machine's adapter, tried in a separate process: a driver that
+//! hangs, exhausts the memory or crashes costs one stage, not the whole check.
 //! Frame and unit: processor seconds, MiB.
 
 use crate::bench::{WayTime, way_times};
@@ -12,12 +12,12 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// What one stage may take.
+/// The limits of one stage.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Processor time where the system tells it of other processes, else time on the clock; 1..=3600.
+    /// Limit of processor time, s, if the system reports it for other processes, else of elapsed time; 1..=3600.
     pub seconds: f64,
-    /// 256..=1048576; known on Linux only.
+    /// Limit of memory, MiB, 256..=1048576; only enforced on Linux.
     pub mib: u64,
 }
 
@@ -35,7 +35,7 @@ impl Limits {
     }
 }
 
-/// How a stage did.
+/// The result of a stage.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct StageFinding {
     pub stage: String,
@@ -45,7 +45,7 @@ pub struct StageFinding {
     pub reason: String,
     /// The case with the largest difference.
     pub worst_case: String,
-    /// Why there is no comparison.
+    /// Why there is no comparison; `None` if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[serde(default)]
     pub failed: Option<String>,
@@ -57,7 +57,7 @@ impl StageFinding {
     }
 }
 
-/// What the process that tries the stages says, a line each.
+/// The messages of the process that tries the stages, one a line.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Event {
@@ -72,9 +72,9 @@ pub enum Event {
 /// Bytes of one transfer: a 12-megapixel shot of 8 bits.
 const SHOT: u64 = 4096 * 3072;
 
-/// The process that tries: the stages from a number on, then the rates and the time of a shot.
+/// The trial process: tries the stages from number `from` on, then measures the rates and the time of a shot.
 pub fn run(from: usize, rates: bool, console: &Console) -> Result<()> {
-    // Nobody reads any more: the process that asked has ended.
+    // Nobody reads the messages if the parent process has ended.
     let tell = |event: Event| console.line(&event);
     let device = match Device::open() {
         Ok(device) => device,
@@ -113,11 +113,11 @@ pub fn run(from: usize, rates: bool, console: &Console) -> Result<()> {
     Ok(())
 }
 
-/// Looks at a process this often.
+/// Interval at which the trial process is checked.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Tries every stage, each within the limits; `tell` is told at once. No rates where a stage was ended: the chain
-/// needs it.
+/// Tries every stage, each within the limits; `tell` receives every event at once. After an aborted stage no rates
+/// are measured, because the chain needs it.
 pub fn watch(limits: &Limits, mut rates: bool, tell: &mut dyn FnMut(Event)) -> Result<()> {
     let names: Vec<&str> = stages::all().iter().map(|e| e.stage.name).collect();
     let mut next = 0;
@@ -136,7 +136,7 @@ pub fn watch(limits: &Limits, mut rates: bool, tell: &mut dyn FnMut(Event)) -> R
             }
             tell(event);
         });
-        // It may have ended by itself.
+        // The process may already have ended.
         let _ = child.kill();
         let status = child.wait().map_err(|e| failed("cannot be waited for", &e))?;
         let why = match ended {
@@ -159,7 +159,7 @@ pub fn watch(limits: &Limits, mut rates: bool, tell: &mut dyn FnMut(Event)) -> R
 
 enum Ended {
     ByItself,
-    /// What it took, against its limit.
+    /// A limit was exceeded; the used amount against the limit.
     Beyond(String),
 }
 
@@ -179,13 +179,13 @@ fn start(from: usize, rates: bool) -> Result<Child> {
     command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn().map_err(|e| failed("cannot be started", &e))
 }
 
-/// Its lines, read on a thread: it may say nothing for minutes.
+/// The lines of the process, read on a thread because it may be silent for minutes.
 fn lines(child: &mut Child) -> Result<Receiver<Event>> {
     let out = BufReader::new(child.stdout.take().expect("piped"));
     let (give, take) = channel();
     let read = move || {
         let events = out.lines().map_while(|l| l.ok()).filter_map(|l| serde_json::from_str(&l).ok());
-        // After a limit was passed nobody listens.
+        // After a limit was exceeded nobody receives the lines.
         events.map(|e| give.send(e)).take_while(|sent| sent.is_ok()).for_each(drop);
     };
     let spawned = std::thread::Builder::new().spawn(read);
@@ -193,7 +193,7 @@ fn lines(child: &mut Child) -> Result<Receiver<Event>> {
     Ok(take)
 }
 
-/// Listens until it ends or takes more than it may since it last said something.
+/// Receives lines until the process ends or exceeds a limit since its last line.
 fn follow(child: &Child, lines: &Receiver<Event>, limits: &Limits, tell: &mut dyn FnMut(Event)) -> Ended {
     let mut since = (Instant::now(), 0.0);
     loop {
@@ -217,13 +217,13 @@ fn follow(child: &Child, lines: &Receiver<Event>, limits: &Limits, tell: &mut dy
     }
 }
 
-/// Processor seconds that a process has had, and MiB that it holds; [proc(5)].
+/// Processor time of a process, s, and its memory, MiB; [proc(5)].
 fn taken(id: u32) -> Option<(f64, u64)> {
-    /// Ticks a second and bytes a page of every Linux that this runs on.
+    /// Ticks per second and bytes per page on every supported Linux.
     const TICKS: f64 = 100.0;
     const PAGE: u64 = 4096;
     let text = std::fs::read_to_string(format!("/proc/{id}/stat")).ok()?;
-    // The name before it may hold blanks.
+    // The name before it may contain blanks.
     let fields: Vec<&str> = text.rsplit_once(')')?.1.split_whitespace().collect();
     let number = |field: usize| fields.get(field - 3)?.parse::<u64>().ok();
     Some(((number(14)? + number(15)?) as f64 / TICKS, (number(24)? * PAGE) >> 20))
@@ -233,7 +233,7 @@ fn taken(id: u32) -> Option<(f64, u64)> {
 mod tests {
     use super::*;
 
-    /// A stand-in for the process that tries: says a line, then takes time or memory.
+    /// Replaces the trial process: prints a line, then uses time or memory.
     fn followed(script: &str, limits: Limits) -> (Ended, usize) {
         let mut child = Command::new("bash").args(["-c", script]).stdout(Stdio::piped()).spawn().unwrap();
         let lines = lines(&mut child).unwrap();

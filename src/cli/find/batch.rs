@@ -1,5 +1,5 @@
-//! In: recordings, a station, a recipe. Out: a scan of each and what was found in it, one after the other; a table,
-//! and how the places repeat.
+//! In: recordings, a station, a recipe. Out: a scan of each and the part found in it, one after the other; a table,
+//! and the repeatability of the poses.
 //! Frame and unit: the scans' frame; mm, degrees.
 
 use crate::cli::terminal::arguments::{changes, parse};
@@ -96,7 +96,7 @@ fn text(b: &Batch) -> String {
     lines.join("\n")
 }
 
-/// Figures and a histogram of a hand's breadth.
+/// Figures and a small histogram.
 fn spread(s: &Spread) -> String {
     const HEIGHTS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let most = s.bars.iter().max().copied().unwrap_or(1).max(1);

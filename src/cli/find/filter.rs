@@ -1,4 +1,4 @@
-//! In: a scan folder, filters. Out: another scan folder without what they take away.
+//! In: a scan folder, filters. Out: another scan folder without the points and cells that the filters remove.
 //! Frame and unit: the height map's grid frame, mm from its corner.
 
 use crate::cli::terminal::console::Console;

@@ -1,5 +1,5 @@
-//! In: a report of find, its recipe, a recording whose robot's poses are known. Out: the part's outlines over one of
-//! its pictures.
+//! In: a report of find, its recipe, a recording with robot poses. Out: the part's outlines over one of its
+//! pictures.
 //! Frame and unit: base frame, mm; px of the picture.
 
 use crate::cli::terminal::console::Console;
@@ -48,7 +48,7 @@ pub struct Args {
     out: PathBuf,
 }
 
-/// What --json prints.
+/// The output of --json.
 #[derive(serde::Serialize)]
 struct Drawn {
     frame: usize,
@@ -102,7 +102,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     Ok(())
 }
 
-/// How far the middle of the outlines lies from the picture's, px; infinite where nothing is seen.
+/// Distance of the outlines' middle from the picture's middle, px; infinite if nothing is visible.
 fn aside(lines: &[Vec<[f64; 2]>], size: [f64; 2]) -> f64 {
     let n = lines.iter().map(Vec::len).sum::<usize>() as f64;
     let middle = [0, 1].map(|i| lines.iter().flatten().map(|p| p[i]).sum::<f64>() / n);

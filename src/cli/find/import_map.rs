@@ -1,4 +1,4 @@
-//! In: a height map or cloud of another sensor. Out: a scan folder on which find works.
+//! In: a height map or cloud of another sensor. Out: a scan folder that find accepts.
 //! Frame and unit: the file's own frame, called map; mm.
 
 use crate::cli::terminal::arguments::numbers;
@@ -58,7 +58,7 @@ pub struct Args {
     out: PathBuf,
 }
 
-/// The missing level, `None` where every level is a height.
+/// The missing level; `None` if every level is a height.
 #[derive(Clone, Copy, Debug)]
 struct Level(Option<f64>);
 

@@ -124,7 +124,7 @@ pub(super) fn summary(r: &Report) -> String {
     s
 }
 
-/// Where the robot inserts, and whether that keeps the tolerance; empty without a pose.
+/// The robot's poses, and whether the tolerance is met; empty without a pose.
 fn poses(r: &Report) -> String {
     let mut s = String::new();
     let Some(p) = &r.poses else { return s };
@@ -142,7 +142,7 @@ fn poses(r: &Report) -> String {
     s
 }
 
-/// Sigmas of the pose and the terms that they add up from.
+/// Sigmas of the pose and their error budget.
 fn uncertainty(r: &Report) -> String {
     let mut s =
         format!("{:12} {} mm, {} degrees (x y z of the part)\n", "sigma", row(&r.sigma_mm, 4), row(&r.sigma_deg, 4));
@@ -157,7 +157,7 @@ fn uncertainty(r: &Report) -> String {
     s
 }
 
-/// How well the scan shows the part: the match, other places of it, its constructions.
+/// How well the scan shows the part: the match, competing positions, its constructions.
 fn seen(r: &Report) -> String {
     let mut s = format!(
         "match        score {:.3}, next best pose {:.3}; {} edges to {:.3} mm, {} surface points to {:.3} mm\n",
@@ -194,7 +194,7 @@ fn row(v: &[f64; 3], digits: usize) -> String {
     v.map(|x| format!("{x:.digits$}")).join(" ")
 }
 
-/// What looks disagree about, in words.
+/// The disagreement of several scans, in words.
 pub fn looks(l: &Disagreement) -> String {
     let mut s = String::new();
     s += &format!(

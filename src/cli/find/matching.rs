@@ -1,4 +1,4 @@
-//! In: a part's template and pictures. Out: where the part lies in each of them: JSON, CSV, a picture with the
+//! In: a part's template and pictures. Out: the part's position in each picture: JSON, CSV, a picture with the
 //! matches drawn in.
 //! Frame and unit: pixels of each picture (x right, y down, an integer is a pixel's centre); degrees, x towards y.
 
@@ -78,7 +78,7 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
-/// What one picture holds.
+/// The matches in one picture.
 #[derive(serde::Serialize)]
 struct Found {
     picture: String,
@@ -87,7 +87,7 @@ struct Found {
     matches: Vec<Listed>,
 }
 
-/// A match as people and programs read it.
+/// A match as it is printed and written.
 #[derive(serde::Serialize)]
 struct Listed {
     x_px: f64,
@@ -202,7 +202,7 @@ fn depth(bits: u8) -> Depth {
     }
 }
 
-/// Largest picture file that a part is taught from.
+/// Most bytes of a picture file from which a part is taught.
 const MOST_BYTES: u64 = 1 << 30;
 
 /// The part in a region of a picture file, and the picture.
@@ -230,7 +230,7 @@ pub(super) fn taught(
     Ok((Template::teach_in_part(name, &image, hidden.as_ref(), region, source, options).map_err(at)?, image))
 }
 
-/// One picture a searched one beside the list; numbered where there are several.
+/// One output picture per searched one, next to the list; numbered if there are several.
 fn overlays(args: &Args) -> Vec<PathBuf> {
     let Some(out) = &args.out else { return vec![] };
     if args.pictures.len() == 1 {

@@ -1,4 +1,4 @@
-//! In: the command line's words about parts. Out: models, recipes, found poses, second looks.
+//! In: command-line options for parts. Out: models, recipes, found poses, verification scans.
 //! Frame and unit: base frame, mm.
 
 pub mod batch;

@@ -1,4 +1,4 @@
-//! In: a drawing of a part (DXF). Out: a recipe by which find knows the part, and what was read, in words.
+//! In: a drawing of a part (DXF). Out: a recipe by which find recognizes the part, and a summary of what was read.
 //! Frame and unit: part frame, x and y as drawn, z towards the viewer; mm from here on.
 
 use crate::cli::insertion::InsertionArgs;

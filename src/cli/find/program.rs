@@ -1,4 +1,4 @@
-//! In: a found position (the JSON of find --out). Out: approach, insertion and retract as a program in a robot's own
+//! In: a found pose (the JSON of find --out). Out: approach, insertion and retract as a program in a robot's
 //! language.
 //! Frame and unit: the tool in the robot's base frame; mm, mm/s.
 

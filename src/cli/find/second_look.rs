@@ -1,5 +1,6 @@
-//! In: a finished scan of a part, its recording's poses, a recipe, a station. Out: the robot poses of a second scan
-//! of the same part from another side, and which errors of which calibration the two together can show.
+//! In: a finished scan of a part, its recording's poses, a recipe, a station. Out: the robot poses of a
+//! verification scan of the same part from another side, and which errors of which calibration both scans together
+//! can show.
 //! Frame and unit: base frame; mm, degrees.
 
 use crate::cli::terminal::console::Console;
@@ -50,7 +51,7 @@ pub struct Args {
     out: PathBuf,
 }
 
-/// What is printed as JSON.
+/// The output of --json.
 #[derive(serde::Serialize)]
 struct Planned<'a> {
     turn_deg: f64,

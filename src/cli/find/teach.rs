@@ -1,6 +1,6 @@
-//! In: a scan folder and where the part's outline, windows and holes lie in its height map, or a picture and a region
-//! of it. Out: a recipe, proven on that scan, and a picture of the proof; or a template for `match` and a picture of
-//! its edges.
+//! In: a scan folder and the part's outline, windows and holes in its height map, or a picture and a region of it.
+//! Out: a recipe, tested on that scan, and a picture of the result; or a template for `match` and a picture of its
+//! edges.
 //! Frame and unit: height map's grid frame, mm from its corner; pixels of the picture.
 
 use super::matching::taught;
@@ -91,7 +91,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     Ok(())
 }
 
-/// A template of the picture's region.
+/// Teaches a template from the picture's region.
 fn template(args: &Args, picture: &Path, console: &Console) -> Result<()> {
     outputs::check(&[&args.out, picture], &Inputs { files: &[&args.scan], ..Inputs::default() })?;
     let options = ModelOptions { contrast: args.contrast, ..ModelOptions::default() };

@@ -1,5 +1,5 @@
-//! In: recordings of pointer and line, a recipe, a station. Out: the insertion procedure step by step,
-//! each step with its numbers, asking where a person would decide.
+//! In: recordings of pointer and line, a recipe, a station. Out: the insertion procedure step by step, each step
+//! with its numbers and, where a person has to decide, a question.
 //! Frame and unit: base frame; poses in the robot's own notation.
 
 use crate::cli::terminal::console::Console;
@@ -100,7 +100,7 @@ fn described(number: usize, step: &Step) -> String {
     s
 }
 
-/// A yes from the terminal; anything else is a no. Without a terminal nobody can answer.
+/// A yes from the terminal; any other answer is a no. Without a terminal the question cannot be answered.
 fn ask(question: &str, console: &Console) -> Result<bool> {
     if !std::io::stdin().is_terminal() {
         return Err(Fault::usage(format!("nobody can answer '{question}': standard input is not a terminal"))

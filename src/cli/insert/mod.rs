@@ -1,4 +1,4 @@
-//! In: the command line's words about insertions. Out: the procedure on recordings, and the job with a robot.
+//! In: command-line options for insertions. Out: the procedure on recordings, and the job with a robot.
 //! Frame and unit: base frame, mm.
 
 pub mod guide;

@@ -1,5 +1,5 @@
-//! In: what every command that moves a robot is told: station, robot, camera, speed, leave to move. Out: the robot
-//! behind its rules, taken; the person at the terminal, who is asked before each motion.
+//! In: the common options of commands that move a robot: station, robot, camera, speed, permission to move. Out:
+//! the robot behind its rules, taken; the person at the terminal, who is asked before each motion.
 //! Frame and unit: mm/s.
 
 use crate::arm::rules::{Confirmation, Guard};
@@ -36,14 +36,14 @@ pub(in crate::cli) struct Moving {
 }
 
 impl Moving {
-    /// The robot behind its rules, taken for motions; Ctrl-C halts it, the station's motions.jsonl has what is asked
-    /// and made.
+    /// The robot behind its rules, taken for motions. Ctrl-C halts it; the station's motions.jsonl logs requests
+    /// and motions.
     ///
     /// # Errors
-    /// `--yes` for a robot that does not say that it is a simulated one; no leave to move; no controller.
+    /// `--yes` for a robot that does not report that it is simulated; no permission to move; no controller.
     pub fn guard(&self) -> Result<Guard> {
         let mut guard = guarded(&self.station, &self.robot)?;
-        // An address on this machine says nothing: a tunnel to a real controller has one too.
+        // A local address proves nothing: a tunnel to a real controller has one too.
         if self.yes && !guard.link().simulated()? {
             return Err(Fault::usage(format!("--yes with the robot {}", self.robot))
                 .cause(
@@ -57,16 +57,16 @@ impl Moving {
         Ok(guard)
     }
 
-    /// Whoever answers for the motions.
+    /// The person who is responsible for the motions.
     pub fn person<'a>(&self, console: &'a Console) -> Person<'a> {
         Person { console, yes: self.yes }
     }
 }
 
-/// Whoever sits at the terminal.
+/// The person at the terminal.
 pub(in crate::cli) struct Person<'a> {
     console: &'a Console,
-    /// Every question is answered with yes: the robot is a simulated one.
+    /// Every question is answered with yes: the robot is simulated.
     yes: bool,
 }
 

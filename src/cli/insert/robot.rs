@@ -1,5 +1,5 @@
-//! In: a station, a camera, recipes, an address. Out: what a robot's own program asks for over TCP, answered until
-//! Ctrl-C.
+//! In: a station, a camera, recipes, an address. Out: answers to the requests of a robot's own program over TCP,
+//! until Ctrl-C.
 //! Frame and unit: poses in the robot's own notation.
 
 use crate::capture::CameraUri;
@@ -43,7 +43,7 @@ pub struct TryOutput {
 fn output(args: &TryOutput, console: &Console) -> Result<()> {
     let settings = Settings::load(&args.station)?;
     let mut guard = guarded(&args.station, &args.robot)?;
-    // From here on a signal ends the wait, not the program with the laser on.
+    // From here on a signal ends the wait instead of ending the program with the laser on.
     let stop = interrupt::asked_for();
     guard.arm(args.allow_motion)?;
     let number = try_output(guard.link(), &settings.outputs.unwrap_or_default(), args.output, &stop)?;

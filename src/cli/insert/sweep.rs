@@ -1,5 +1,5 @@
-//! In: a station, a recipe, maybe a robot that says where it stands. Out: how the line goes over the part, what is
-//! left beside it, and which speed goes with which step; nothing moves.
+//! In: a station, a recipe, optionally a robot that reports its pose. Out: the path of the line over the part, its
+//! margins, and matching speed and step; nothing moves.
 //! Frame and unit: base frame; poses in the robot's own notation; mm, mm/s, pictures a second.
 
 use crate::cli::terminal::console::Console;

@@ -1,4 +1,4 @@
-//! In: a station folder. Out: a new one, a summary of one, or values moved in and out of it.
+//! In: a station folder. Out: a new station, a summary, or values imported or exported.
 //! Frame and unit: camera and flange frames, mm.
 
 use super::{keep, serve};
@@ -193,7 +193,7 @@ fn make(a: &New, console: &Console) -> Result<()> {
     Ok(())
 }
 
-/// Vouches for a calibration that was edited.
+/// Seals a calibration that was edited.
 fn seal(a: &Seal, console: &Console) -> Result<()> {
     let vouch = match a.kind {
         Kind::Camera => Rig::vouch::<Intrinsics>,
@@ -212,7 +212,7 @@ fn seal(a: &Seal, console: &Console) -> Result<()> {
     Ok(())
 }
 
-/// What a station is called where nobody says it.
+/// The default name of a station.
 fn named(folder: &Path) -> String {
     let full = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
     full.file_name().map_or_else(|| "station".into(), |n| n.to_string_lossy().into_owned())
@@ -262,7 +262,7 @@ fn summary(settings: &Settings, rig: &Rig) -> String {
                 if kind == AxisKind::Linear { "" } else { &through }
             )
         };
-        // Most stations have a robot.
+        // A missing axis is not listed, because most stations have a robot.
         if Option::is_some(part) { line(kind.words(), part, shown) } else { String::new() }
     };
     let linear = axis(AxisKind::Linear, &rig.linear_axis);

@@ -1,6 +1,6 @@
-//! In: a station. Out: its settings changed by name, all that was chosen and measured of it in one file, and the way
-//! back.
-//! Frame and unit: as docs/file-formats.md says of each setting.
+//! In: a station. Out: its settings changed by name, all its settings and measurements in one file, and their
+//! restoration.
+//! Frame and unit: stated for each setting in docs/file-formats.md.
 
 use crate::cli::terminal::arguments;
 use crate::cli::terminal::console::Console;

@@ -1,4 +1,4 @@
-//! In: a station folder. Out: a new one, what one knows, values moved in and out of it, its screen.
+//! In: a station folder. Out: a new station, a summary, values imported or exported, the operator's screen.
 //! Frame and unit: camera and flange frames, mm.
 
 mod command;

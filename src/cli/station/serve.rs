@@ -92,7 +92,7 @@ pub struct Password {
     out: PathBuf,
 }
 
-/// Where the screen is when nobody asks otherwise.
+/// The default port of the screen.
 const PORT: u16 = 8620;
 
 pub fn run(args: &Serve, console: &Console) -> Result<()> {
@@ -163,7 +163,7 @@ pub fn password(args: &Password, console: &Console) -> Result<()> {
     Ok(())
 }
 
-/// The password as it is typed twice, unseen, at a terminal; else a line of standard input.
+/// The password, typed twice without echo at a terminal, or a line of standard input.
 fn asked(console: &Console) -> Result<String> {
     let unreadable = |e: std::io::Error| {
         Fault::input(format!("the password cannot be read: {e}")).next("type it, or send it to standard input")

@@ -1,23 +1,23 @@
-//! In: an option's value as typed. Out: the value, or what was wanted.
+//! In: an option's value as typed. Out: the parsed value, or what was expected.
 //! Frame and unit: the option's.
 
 use crate::fault::{Fault, Result};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// Reads numbers parted by commas, for clap's `value_parser`.
+/// Parses numbers separated by commas, for clap's `value_parser`.
 pub(crate) fn numbers<const N: usize>(s: &str) -> std::result::Result<[f64; N], String> {
     let read: Option<Vec<f64>> = s.split(',').map(|v| v.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
     let read = read.and_then(|v| v.try_into().ok());
     read.ok_or_else(|| format!("wanted {N} numbers parted by commas, e.g. {}", vec!["0"; N].join(",")))
 }
 
-/// Reads an option's value with the type's own `FromStr`, for clap's `value_parser`.
+/// Parses an option's value with the type's own `FromStr`, for clap's `value_parser`.
 pub(crate) fn parse<T: std::str::FromStr<Err = String>>(s: &str) -> std::result::Result<T, String> {
     s.parse()
 }
 
-/// Reads NAME=VALUE each; nothing behind the = is null.
+/// Parses words of the form NAME=VALUE; an empty VALUE means null.
 pub(crate) fn changes(words: &[String]) -> Result<BTreeMap<String, Value>> {
     let change = |s: &String| {
         let (name, value) = s.split_once('=').ok_or_else(|| {

@@ -1,4 +1,4 @@
-//! In: results, warnings, progress. Out: data on stdout (text or JSON), talk and bars on stderr.
+//! In: results, warnings, progress. Out: data on stdout (text or JSON), messages and bars on stderr.
 //! Frame and unit: none.
 
 use super::printable::{printable, printable_json};
@@ -7,11 +7,11 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::cell::RefCell;
 use std::io::{ErrorKind, IsTerminal, Write};
 
-/// Where a command talks to. One a process; the one place that prints.
+/// The output of a command. Each process has one, and nothing else prints.
 pub struct Console {
     pub json: bool,
     quiet: bool,
-    /// The first thing that stdout did not take.
+    /// The first error of writing to stdout.
     failed: RefCell<Option<std::io::Error>>,
 }
 
@@ -29,14 +29,14 @@ impl Console {
         }
     }
 
-    /// A piece of the result that is known before the rest; with --json it comes with the rest.
+    /// A part of the result that is known before the rest; with --json it is printed with the rest.
     pub fn part(&self, text: &str) {
         if !self.json {
             self.data(&printable(text.trim_end()));
         }
     }
 
-    /// One of many results, as one line of JSON, at once. False where nobody reads them any more.
+    /// One of many results as one line of JSON, printed at once. False if nobody reads them any more.
     pub fn line(&self, value: &impl serde::Serialize) -> bool {
         self.data(&printable_json(&serde_json::to_string(value).expect("plain data")));
         self.failed.borrow().is_none()
@@ -49,8 +49,8 @@ impl Console {
         }
     }
 
-    /// `Err` where stdout took less than all of the data. A reader that has seen enough (`| head`) is no error: what
-    /// the command wrote into files is whole.
+    /// `Err` if stdout did not accept all of the data. A reader that stops early (`| head`) is not an error: the
+    /// files that the command wrote are complete.
     pub fn finish(&self) -> Result<()> {
         match &*self.failed.borrow() {
             Some(e) if e.kind() != ErrorKind::BrokenPipe => Err(Fault::output(format!("standard output: {e}"))
@@ -60,19 +60,19 @@ impl Console {
         }
     }
 
-    /// Talk. Nothing is left to be said when even stderr is closed.
+    /// Prints a message. If even stderr is closed, nothing can be reported.
     fn tell(&self, text: &str) {
         let _ = write!(std::io::stderr().lock(), "{}", printable(text));
     }
 
-    /// Something a person should know; never data.
+    /// Information for a person; never data.
     pub fn say(&self, text: impl AsRef<str>) {
         if !self.quiet {
             self.tell(&format!("{}\n", text.as_ref()));
         }
     }
 
-    /// Something that may be wrong; said even when quiet.
+    /// A warning; printed even when quiet.
     pub fn warn(&self, text: impl AsRef<str>) {
         self.tell(&format!("warning: {}\n", text.as_ref()));
     }

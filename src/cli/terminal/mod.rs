@@ -1,5 +1,5 @@
-//! In: results, talk, keys pressed. Out: stdout for data, stderr for people, options' values, a scan that ends when
-//! asked to.
+//! In: results, messages, signals. Out: stdout for data, stderr for people, options' values, a scan that ends on
+//! request.
 //! Frame and unit: none.
 
 pub mod arguments;

@@ -1,4 +1,4 @@
-//! In: where results are to go, and the folders and files that a command reads. Out: a refusal where one would
+//! In: the destinations of results, and the folders and files that a command reads. Out: a refusal if one would
 //! replace another.
 //! Frame and unit: none.
 
@@ -9,7 +9,7 @@ use crate::simulate::Set;
 use crate::station::{load_report, of_a_scan};
 use std::path::Path;
 
-/// What a command reads: none of it may be among its results.
+/// The inputs of a command: none of them may be among its results.
 #[derive(Default)]
 pub struct Inputs<'a> {
     pub files: &'a [&'a Path],
@@ -17,7 +17,7 @@ pub struct Inputs<'a> {
     pub station: Option<&'a Path>,
 }
 
-/// Refuses results that would replace an input, and two results of one name.
+/// Refuses results that would replace an input, and two results with the same name.
 pub fn check(results: &[&Path], inputs: &Inputs) -> Result<()> {
     for (i, out) in results.iter().enumerate() {
         not_over(out, inputs.files.iter().copied())?;
@@ -33,7 +33,7 @@ pub fn check(results: &[&Path], inputs: &Inputs) -> Result<()> {
     Ok(())
 }
 
-/// Refuses to simulate into a folder that holds recordings or a station that are not simulated ones.
+/// Refuses to simulate into a folder with recordings or a station that were not simulated.
 pub fn check_simulation(out: &Path) -> Result<()> {
     let refuse = |what: String| {
         Err(Fault::usage(what)
@@ -61,7 +61,7 @@ pub fn check_simulation(out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Refuses a folder that is a recording or a station, or whose scan is not one of `label`.
+/// Refuses a folder that is a recording or a station, or whose scan does not have the label `label`.
 pub fn check_scan(out: &Path, label: &str) -> Result<()> {
     if let Some(file) = ["meta.json", "station.toml"].iter().find(|f| out.join(f).exists()) {
         return Err(Fault::usage(format!("{}: holds a {file}", out.display()))

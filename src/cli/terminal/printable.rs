@@ -1,22 +1,22 @@
-//! In: text that may hold names from other people's files. Out: the same, unable to steer a terminal.
+//! In: text that may contain names from foreign files. Out: the same text, without the power to control a terminal.
 //! Frame and unit: none.
 
 use std::borrow::Cow;
 
-/// True of what steers a terminal or turns the order of its letters: control characters but line feed and tab
-/// (ECMA-48: C0, DEL, C1), and the marks of writing direction (Unicode UAX 9), with which a name shows as another one.
+/// Whether a character controls a terminal or changes the order of letters: control characters except line feed and
+/// tab (ECMA-48: C0, DEL, C1), and direction marks (Unicode UAX 9), which can disguise a name.
 fn steers(c: char) -> bool {
     (c.is_control() && c != '\n' && c != '\t')
         || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// What steers is shown as its number, `\u{1b}`.
+/// Replaces such characters with their escapes, `\u{1b}`.
 pub fn printable(text: &str) -> Cow<'_, str> {
     replaced(text, |c| c.escape_unicode().to_string())
 }
 
-/// The same of JSON, whose strings alone can hold such characters: as JSON writes them, so that the value stays what
-/// it is.
+/// The same for JSON, where only strings can contain such characters. They become JSON escapes, so that the value
+/// does not change.
 pub fn printable_json(text: &str) -> Cow<'_, str> {
     replaced(text, |c| format!("\\u{:04x}", u32::from(c)))
 }

@@ -1,17 +1,16 @@
-//! In: this machine's processors and what the process may use of them. Out: the pool of threads that all parallel
-//! work runs on.
+//! In: this machine's processors and the limits of the process. Out: the thread pool for all parallel work.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
 use rayon::{ThreadBuilder, ThreadPoolBuilder};
 use std::sync::mpsc::{Sender, channel};
 
-/// More threads than this, and than four a processor, are a slip of the hand: a thread that finds no memory for its
-/// signal stack takes the whole process with it.
+/// Requested numbers of threads above this, and above four per processor, are taken as a mistake and reduced. A
+/// thread without memory for its signal stack crashes the whole process.
 const MOST: usize = 256;
 
-/// Starts as many threads as there are processors, or as many of them as the process gets. rayon's own way is all or a
-/// panic in whatever needs the first of them, and cannot be tried twice.
+/// Starts one thread per processor, or as many as the process can get. rayon's own start either gets all threads or
+/// panics at its first use, and cannot be repeated.
 pub fn start() -> Result<()> {
     let wanted = std::thread::available_parallelism().map_or(1, |n| n.get());
     pool(wanted, std::env::var("RAYON_NUM_THREADS").ok().and_then(|n| n.parse().ok()))
@@ -20,7 +19,7 @@ pub fn start() -> Result<()> {
 fn pool(processors: usize, asked: Option<usize>) -> Result<()> {
     let wanted = asked.filter(|n| *n > 0).unwrap_or(processors).min(MOST.max(4 * processors));
     let mut failed = None;
-    // Each waits for what it is to be in the pool.
+    // Each thread waits for its role in the pool.
     let mut waiting: Vec<Sender<ThreadBuilder>> = Vec::new();
     while waiting.len() < wanted && failed.is_none() {
         let (give, take) = channel::<ThreadBuilder>();
@@ -31,7 +30,8 @@ fn pool(processors: usize, asked: Option<usize>) -> Result<()> {
                 thread.run();
             }
         };
-        // One by one: a thread takes some memory more when it begins, and cannot do without.
+        // Threads are started one by one, because each allocates some more memory at its start that it cannot run
+        // without.
         match std::thread::Builder::new().name(format!("pool {}", waiting.len())).spawn(body) {
             Ok(_) if begun.recv().is_ok() => waiting.push(give),
             Ok(_) => failed = Some(std::io::ErrorKind::OutOfMemory.into()),
@@ -39,7 +39,7 @@ fn pool(processors: usize, asked: Option<usize>) -> Result<()> {
         }
     }
     if failed.is_some() {
-        // What the last of them took is needed for the work itself.
+        // Some threads are given up, because the work itself needs their memory.
         waiting.truncate(waiting.len().div_ceil(2));
     }
     if let (true, Some(e)) = (waiting.is_empty(), failed) {

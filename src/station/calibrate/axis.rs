@@ -1,5 +1,5 @@
-//! In: pictures of a board that rides on a linear axis or turntable, with the counts there, and a station with a
-//! camera. Out: the axis' calibration, its report, and the files it came from.
+//! In: pictures of a board that is mounted on a linear axis or turntable, with their counts, and a station with a
+//! camera. Out: the axis' calibration, its report, and its input files.
 //! Frame and unit: camera frame, mm, rad, counts.
 
 use super::board_views::{FrameBoard, boards};
@@ -15,7 +15,7 @@ use crate::geometry::{Axis, angle_between};
 use crate::recording::Recording;
 use crate::rig::{Calibration, Rig, Volume, hash_file};
 
-/// How [`calibrate_axis`] is run.
+/// Options of [`calibrate_axis`].
 #[derive(Clone, Debug, Default)]
 pub struct AxisRun {
     /// Gate and seed of the fit.
@@ -24,7 +24,7 @@ pub struct AxisRun {
     pub asked: Asked,
 }
 
-/// Calibrates the axis that the recording's `motion` names. `progress` is told (pictures done, pictures in all).
+/// Calibrates the axis that the recording's `motion` names. `progress` receives (pictures done, pictures in all).
 pub fn calibrate_axis(
     recording: &Recording,
     rig: &Rig,
@@ -76,7 +76,8 @@ pub fn calibrate_axis(
     Ok(Calibrated { calibration, page, missing })
 }
 
-/// Reads a board that looks the same after a turn as it stood at the stop before: it turns by little from stop to stop.
+/// Resolves a board that looks the same after a turn: of the possible poses the one nearest to the previous stop's
+/// is taken.
 fn one_origin(found: &mut [(f64, FrameBoard)]) -> Option<String> {
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     let all = turns(&found[0].1.board);

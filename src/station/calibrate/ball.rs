@@ -20,7 +20,7 @@ use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Calibrates a line-profile sensor from profiles of a ball. Also gives warnings in words.
+/// Calibrates a line-profile sensor from profiles of a ball. Also returns warnings in words.
 pub fn calibrate_profile_hand_eye(
     profiles: &Path,
     poses: &Path,
@@ -59,7 +59,7 @@ pub fn calibrate_profile_hand_eye(
     Ok((Calibrated { calibration, page, missing: Vec::new() }, warnings))
 }
 
-/// How well profiles and poses agree with a transform that came from elsewhere. Also gives warnings in words.
+/// The agreement of profiles and poses with a given transform. Also returns warnings in words.
 pub fn evaluate_profile_hand_eye(
     profiles: &Path,
     poses: &Path,

@@ -1,5 +1,5 @@
-//! In: the pictures of a recording that show boards, and a calibrated camera. Out: the boards' poses
-//! as measurements, and by name why a picture has none.
+//! In: the pictures of a recording that show boards, and a calibrated camera. Out: the boards' poses as
+//! measurements, and for each picture without a pose the reason.
 //! Frame and unit: camera_from_board, mm.
 
 use crate::calibrate::boards::{FindOptions, find};
@@ -16,9 +16,9 @@ use rayon::prelude::*;
 pub struct FrameBoard {
     /// Index into the recording's frames.
     pub frame: usize,
-    /// As meta.json describes it; a dot diameter that it leaves out is the pictures' median, mm.
+    /// The board as meta.json describes it; an unstated dot diameter is the pictures' median, mm.
     pub board: BoardSpec,
-    /// camera_from_board as measured, mm, with what its pixels say.
+    /// camera_from_board as measured, mm, with the covariance from its pixels.
     pub pose: MeasuredPose,
     /// The board looks the same after a turn: only its plane is known, not its origin.
     pub ambiguous: bool,
@@ -33,8 +33,8 @@ pub struct Boards {
     pub missing: Vec<(String, String)>,
 }
 
-/// Finds and measures the board in every frame's ambient picture. Refused: a recording without
-/// boards or ambient pictures, another picture size than the camera's.
+/// Finds and measures the board in every frame's ambient picture. Errors: a recording without boards or ambient
+/// pictures, another picture size than the camera's.
 pub fn boards(
     recording: &Recording,
     camera: &Calibration<Intrinsics>,
@@ -53,8 +53,8 @@ pub fn boards(
             .next("record an ambient picture with each frame"));
     }
     let done = std::sync::atomic::AtomicUsize::new(0);
-    // A picture that is missing or of another size is the recording's fault and ends it; a board that is not
-    // found is that picture's.
+    // A picture that is missing or of another size is a fault of the recording and ends this; a board that is not
+    // found concerns only its picture.
     let each: Vec<(String, Result<Seen>)> = frames
         .par_iter()
         .map(|(index, frame, name)| {
@@ -89,7 +89,7 @@ pub fn boards(
     Ok(out)
 }
 
-/// A board in a picture, and the diameter of its dots where the description leaves it open.
+/// A board in a picture, and the diameter of its dots if the description does not state it.
 type Seen = (FrameBoard, Option<f64>);
 
 fn one(frame: usize, name: &str, board: &BoardSpec, picture: &Image, camera: &Intrinsics) -> Result<Seen> {
@@ -99,7 +99,7 @@ fn one(frame: usize, name: &str, board: &BoardSpec, picture: &Image, camera: &In
     Ok((FrameBoard { frame, board, pose, ambiguous: view.ambiguous }, view.dot_diameter))
 }
 
-/// Pictures that do not tell the colour of their board's first square take it from the first one that does.
+/// Pictures that do not show the colour of their board's first square take it from the first picture that does.
 fn first_squares(
     each: Vec<(String, Result<Seen>)>,
     frames: &[(usize, &FrameRef, &str)],
@@ -117,9 +117,9 @@ fn first_squares(
     each.into_iter().zip(frames).map(again).collect()
 }
 
-/// The fault of a recording none of whose pictures shows its board; one of each picture.
+/// The fault of a recording without any board, from one fault for each picture.
 fn none_found(faults: &[Fault], missing: &[(String, String)]) -> Fault {
-    // The picture that says what most pictures say.
+    // Chooses the picture whose cause most pictures share.
     let votes = |f: &Fault| faults.iter().filter(|o| o.cause == f.cause).count();
     let (fault, (name, _)) =
         faults.iter().zip(missing).rev().max_by_key(|(f, _)| votes(f)).expect("one picture or more");
@@ -129,7 +129,7 @@ fn none_found(faults: &[Fault], missing: &[(String, String)]) -> Fault {
         .next(format!("{}; compare meta.json's board with the real one", fault.next))
 }
 
-/// Dots of unstated diameter get the one that the pictures show, in the median.
+/// Sets an unstated dot diameter to the median over the pictures.
 fn know_diameter(found: &mut [FrameBoard], mut diameters: Vec<f64>) {
     diameters.sort_by(f64::total_cmp);
     let Some(median) = diameters.get(diameters.len() / 2) else { return };

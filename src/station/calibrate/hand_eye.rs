@@ -1,5 +1,5 @@
 //! In: a recording of a fixed board with robot poses and a station with a camera, or poses of both alone. Out: the
-//! hand-eye calibration, its report, and the files it came from.
+//! hand-eye calibration, its report, and its input files.
 //! Frame and unit: flange_from_camera (eye in hand) or base_from_camera (eye to hand); mm, rad.
 
 use super::board_views::{FrameBoard, boards};
@@ -21,16 +21,17 @@ use crate::robot::Written;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// How [`calibrate_hand_eye`] is run.
+/// Options of [`calibrate_hand_eye`].
 #[derive(Clone, Debug)]
 pub struct HandEyeRun {
     /// Name of the pose file in the recording; `None`: the one that meta.json names.
     pub poses: Option<String>,
-    /// On the flange, or beside the robot.
+    /// Camera on the flange, or beside the robot.
     pub mount: Mount,
     /// Noise of the robot, gates and seed of the fit.
     pub solver: HandEyeOptions,
-    /// Judged where the laser plane is used, unless stated; without a laser plane where the boards stood.
+    /// Depths and tolerance of the verdict: those of the laser plane unless stated; without a laser plane those of
+    /// the boards.
     pub asked: Asked,
 }
 
@@ -41,21 +42,21 @@ pub struct PosePairs {
     pub robot: PathBuf,
     /// File of the boards' poses, camera_from_board, each with the index of its robot pose.
     pub boards: PathBuf,
-    /// Sigmas of the board poses per axis, mm and rad, where they are known.
+    /// Sigmas of the board poses per axis, mm and rad, if known.
     pub board_sigma: Option<[f64; 2]>,
 }
 
-/// What a calibration command leaves: the record to be stored, the page to be read.
+/// Result of a calibration command: the record to be stored and the page.
 pub struct Calibrated<T> {
-    /// Value, covariance, quality and hashes of what went in.
+    /// Value, covariance, quality and hashes of the inputs.
     pub calibration: Calibration<T>,
-    /// The report for people.
+    /// The report for a person.
     pub page: Page,
     /// Pictures that could not be used, with the reason.
     pub missing: Vec<(String, String)>,
 }
 
-/// Where the camera sits.
+/// The calibrated camera pose.
 pub enum HandEyeResult {
     /// Eye in hand: flange_from_camera, mm.
     OnFlange(Calibrated<HandEye>),
@@ -63,24 +64,24 @@ pub enum HandEyeResult {
     InBase(Calibrated<Rigid<Base, Camera>>),
 }
 
-/// Width of the view at a distance of 1, where no camera is known: a usual lens sees 20 to 25 degrees.
+/// Width of the view at a distance of 1 if no camera is known: a usual lens sees 20 to 25 degrees.
 const USUAL_VIEW: f64 = 0.4;
 
-/// What the pairs came from, and what is to be said of it.
+/// The pairs with their origin and remarks.
 struct Gathered<'a> {
     pairs: Vec<Pair>,
-    /// The camera that the boards were measured with, where they were seen in pictures.
+    /// The camera with which the boards were measured, if they were seen in pictures.
     camera: Option<&'a Calibration<Intrinsics>>,
-    /// What went in: name to hash.
+    /// Inputs: name and hash.
     inputs: BTreeMap<String, String>,
     missing: Vec<(String, String)>,
     notes: Vec<String>,
-    /// What states the board's lengths.
+    /// The source of the board's lengths, in words.
     board_length: String,
 }
 
-/// Calibrates the hand-eye transform from a recording of one board that stands still (eye in hand)
-/// or is carried by the flange (eye to hand). `progress` is told (pictures done, pictures in all).
+/// Calibrates the hand-eye transform from a recording of one board that stands still (eye in hand) or is carried by
+/// the flange (eye to hand). `progress` receives (pictures done, pictures in all).
 pub fn calibrate_hand_eye(
     recording: &Recording,
     rig: &Rig,
@@ -126,7 +127,7 @@ pub fn calibrate_hand_eye_from_poses(files: &PosePairs, rig: &Rig, run: &HandEye
     let file = load_poses(&files.robot)?;
     let poses: Vec<_> = file.poses.iter().zip(&file.written).collect();
     let boards = load_board_poses(&files.boards)?;
-    // Boards are compared at the corners of a square that a usual lens sees nearly whole at their distance.
+    // Boards are compared at the corners of a square that a usual lens sees almost completely at their distance.
     let depths = Volume::spanned(boards.iter().map(|(_, b)| b.translation.z), "where the boards stood");
     let side = USUAL_VIEW * depths.map_or(0.0, |d| d.middle());
     let pair = |(index, board): &(usize, Rigid<Camera, Board>)| {
@@ -140,7 +141,7 @@ pub fn calibrate_hand_eye_from_poses(files: &PosePairs, rig: &Rig, run: &HandEye
     };
     let gathered = Gathered {
         pairs: boards.iter().map(pair).collect::<Result<_>>()?,
-        // The result is used with the station's camera, whoever measured the boards.
+        // The result is used with the station's camera, whatever camera measured the boards.
         camera: rig.camera.as_ref(),
         inputs: BTreeMap::from([
             (file_name(&files.robot), hash_file(&files.robot)?),
@@ -150,7 +151,7 @@ pub fn calibrate_hand_eye_from_poses(files: &PosePairs, rig: &Rig, run: &HandEye
         notes: Vec::new(),
         board_length: "the size that the board's poses were computed with".into(),
     };
-    // Nothing is known in px: a pinhole of focal length 1 makes them tangents, which the report leaves out.
+    // Nothing is known in px: a pinhole of focal length 1 makes pixels tangents, which the report omits.
     let tangents = Intrinsics {
         fx: 1.0,
         fy: 1.0,
@@ -165,12 +166,12 @@ pub fn calibrate_hand_eye_from_poses(files: &PosePairs, rig: &Rig, run: &HandEye
     concluded(gathered, &CameraCovariance::exact(), &tangents, rig, view, run)
 }
 
-/// The pair of a board and a robot pose with the numbers that it was read from.
+/// The pair of a board and a robot pose, with the numbers from which the pose was read.
 fn paired(mount: Mount, (pose, written): (&Rigid<Base, Flange>, &Written), seen: MeasuredPose) -> Pair {
     Pair { written: Some(written.clone()), ..Pair::new(mount.near_from_far(pose), seen) }
 }
 
-/// `view` is how wide the camera sees at a depth, mm.
+/// `view` is the width of the camera's view at a depth, mm.
 fn concluded(
     g: Gathered<'_>,
     covariance_of_camera: &CameraCovariance,
@@ -210,8 +211,8 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Pictures that went into the camera's calibration have said what they know of the camera: here they speak of the
-/// board's pose alone. Returns how many there are.
+/// Pictures that went into the camera's calibration have already contributed to the camera: here they determine
+/// only the board's pose. Returns their number.
 fn said_already(recording: &Recording, camera: &Calibration<Intrinsics>, pairs: &mut [Pair]) -> Result<usize> {
     let known: std::collections::BTreeSet<&String> = camera.inputs.values().collect();
     let mut count = 0;
@@ -224,7 +225,7 @@ fn said_already(recording: &Recording, camera: &Calibration<Intrinsics>, pairs: 
     Ok(count)
 }
 
-/// Reads a board that looks the same after a turn alike in all pictures, and says so.
+/// Gives a board that looks the same after a turn one origin in all pictures, and returns a remark.
 fn one_origin(pairs: &mut [Pair], found: &[FrameBoard], seed: u64) -> Result<Option<String>> {
     if !found.iter().any(|b| b.ambiguous) {
         return Ok(None);

@@ -1,5 +1,5 @@
-//! In: pairs of pictures of boards (room light, laser) and a station with a camera. Out: the laser
-//! plane's calibration; the stripe is found by the scan engine's own stages and the straight line on each board.
+//! In: pairs of pictures of boards (room light, laser) and a station with a camera. Out: the laser plane's
+//! calibration. The stripe is found by the scan engine's own stages and a straight line on each board.
 //! Frame and unit: camera frame, mm.
 
 use super::board_views::{Boards, FrameBoard, boards};
@@ -20,21 +20,21 @@ use crate::recording::{Beam, Recording, hot_pixels};
 use crate::rig::{Calibration, Kind, Rig, Volume, hash_file};
 use crate::scan::{Engine, Extraction, Format, Optical, Place, Processor, Where};
 
-/// How [`calibrate_laser_plane`] is run.
+/// Options of [`calibrate_laser_plane`].
 #[derive(Clone, Debug)]
 pub struct LaserPlaneRun {
     /// Gates and seed of the fit.
     pub solver: LaserPlaneOptions,
     /// Depths and tolerance by which the result is judged.
     pub asked: Asked,
-    /// How the stripe is found, as in a scan.
+    /// How the stripe is extracted, as in a scan.
     pub extraction: Extraction,
     /// Where the stages run.
     pub place: Where,
 }
 
-/// Calibrates the laser plane from a recording with an `ambient` and a `laser` picture in each frame,
-/// the board in the same place in both.
+/// Calibrates the laser plane from a recording with an `ambient` and a `laser` picture in each frame; the board has
+/// the same pose in both.
 pub fn calibrate_laser_plane(
     recording: &Recording,
     rig: &Rig,
@@ -85,8 +85,8 @@ pub fn calibrate_laser_plane(
     Ok(Calibrated { calibration, page, missing })
 }
 
-/// The stripe in pictures of boards, and the sheet that it shows: nothing needs to be known of it. `images` hold the
-/// laser's light alone.
+/// Finds the stripe in pictures of boards, and the sheet, without prior knowledge of the sheet. `images` contain
+/// only the laser's light.
 pub(super) fn sheet_on_boards(
     seen: &[FrameBoard],
     images: &[Image],
@@ -111,8 +111,8 @@ pub(super) fn sheet_on_boards(
         let fit = solve(&views, camera, c, factor, &run.solver)?;
         Ok((views, fit))
     };
-    // Nothing is known of the plane yet: whole pictures, the stripe taken to run along rows and then
-    // along columns. With the plane that comes out better the stages run again as in a scan.
+    // The plane is unknown so far: whole pictures are used, with the stripe assumed first along rows and then along
+    // columns. The better plane is then used to run the stages again as in a scan.
     let everywhere = [0.0, f64::INFINITY];
     let unknown = |across: Vec3| Plane::new(across * 1e-3 + Vec3::z(), 1000.0).expect("not zero");
     let guesses = [fit_with(&unknown(Vec3::y()), everywhere), fit_with(&unknown(Vec3::x()), everywhere)];
@@ -158,7 +158,7 @@ fn stripes(
                 width_px: f64::from(p.width_px),
             })
             .collect();
-        // In order along the stripe, whatever order the stages came in.
+        // Sorted along the stripe, whatever the order of the stages' results.
         let columns = laser.normal.y.abs() >= laser.normal.x.abs();
         peaks.sort_by(|a, b| {
             let key = |p: &StripePeak| if columns { p.pixel.x } else { p.pixel.y };

@@ -1,5 +1,5 @@
-//! In: a recording of a part that was passed to and fro, paired by clock; a station. Out: by how much its pictures
-//! are late against its poses.
+//! In: a recording of a part that was passed back and forth, paired by clock; a station. Out: the delay of its
+//! pictures relative to its poses.
 //! Frame and unit: the cloud's frame, mm; ms.
 
 use crate::calibrate::latency::{Delay, Passing, delay};
@@ -13,24 +13,24 @@ use crate::station::settings::Settings;
 use crate::station::volume::believed;
 use std::collections::BTreeMap;
 
-/// What a calibration of the latency came to.
+/// Result of a calibration of the latency.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct LatencyFound {
-    /// In all: what had been taken for it, and what was found beyond.
+    /// The total latency: the one assumed in the recording plus the one found beyond it.
     pub latency: Latency,
-    /// What was found beyond.
+    /// The part found beyond the assumed latency.
     pub beyond: Delay,
-    /// Shots that were used.
+    /// Number of shots used.
     pub shots: usize,
 }
 
-/// A delay that is known no better is of no use, ms.
+/// Largest accepted sigma of the delay, ms.
 const WORST: f64 = 1.0;
 
 /// Finds the delay.
 ///
 /// # Errors
-/// A recording that was not paired by clock; one whose passes do not show the delay.
+/// The recording was not paired by clock, or its passes do not determine the delay.
 pub fn calibrate_latency(
     recording: &Recording,
     rig: &Rig,
@@ -87,7 +87,7 @@ pub fn calibrate_latency(
     Ok(LatencyFound { latency, beyond, shots: shots.len() })
 }
 
-/// Points with the way they go a second, by a thousandth of it.
+/// Points with their velocity per second, from the motion in a thousandth of a second.
 fn passing(
     carrier: &Carrier,
     stand: &Stand,
@@ -102,7 +102,7 @@ fn passing(
     Ok(points.map(|at| Passing { at, velocity: (moves.point(&at) - at) / PART }).collect())
 }
 
-/// What the clock said of each shot, and the delay that all were taken with, ns.
+/// The motion rate of each shot by its clock, and the delay with which all shots were taken, ns.
 fn pairing(recording: &Recording) -> Result<(Vec<Option<Slip>>, f64)> {
     let taken: Vec<_> = recording.meta.frames.iter().filter(|f| f.laser.is_some()).map(|f| f.taken.as_ref()).collect();
     let rates: Vec<Option<Slip>> = taken.iter().map(|t| t.and_then(|t| t.rate)).collect();

@@ -1,4 +1,4 @@
-//! Says whether a station's camera is on the flange or stands still, and how that is known.
+//! Determines whether a station's camera is on the flange or stands still, and from which source that is known.
 
 use crate::calibrate::hand_eye::options::Mount;
 use crate::fault::{Fault, Result};
@@ -6,21 +6,21 @@ use crate::rig::{Kind, Rig};
 use crate::station::settings::Settings;
 use std::path::Path;
 
-/// Where a station's camera is mounted.
+/// The mount of a station's camera.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mounted {
-    /// What calibrations go by.
+    /// The mount that calibrations use.
     pub mount: Mount,
-    /// What is to be said where nobody stated it; `None`: station.toml or the person did.
+    /// A remark if the mount was assumed; `None`: station.toml or the person stated it.
     pub assumed: Option<String>,
 }
 
-/// The mount that station.toml states; else the one that the station's stored record is of; else the one that a person
-/// states with the command; else the camera is taken to be on the flange, and that is said.
+/// The mount of a station: first as station.toml states it, then that of the station's stored record, then the one
+/// stated with the command. Without any of these the camera is assumed to be on the flange, with a remark.
 ///
 /// # Errors
-/// A person states another mount than the station has. The station has records of both mounts, and nothing says which
-/// one holds.
+/// The command states another mount than the station has. The station has records of both mounts, and nothing
+/// decides between them.
 pub fn mount_of(station: &Path, settings: &Settings, stated: Option<Mount>) -> Result<Mounted> {
     let set = settings.mount;
     let stored = |kind| Rig::stored(station, kind);

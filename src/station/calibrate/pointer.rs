@@ -15,7 +15,7 @@ use crate::geometry::{Camera, Ray};
 use crate::recording::{Beam, Recording};
 use crate::rig::{Calibration, Kind, Rig, Volume, hash_file};
 
-/// How [`calibrate_pointer`] is run.
+/// Options of [`calibrate_pointer`].
 #[derive(Clone, Debug)]
 pub struct PointerRun {
     /// How the spot is found in the pictures.
@@ -26,8 +26,8 @@ pub struct PointerRun {
     pub asked: Asked,
 }
 
-/// Calibrates the pointer from a recording with an `ambient` and a `laser` picture in each frame, the
-/// board in the same place in both.
+/// Calibrates the pointer from a recording with an `ambient` and a `laser` picture in each frame; the board has the
+/// same pose in both.
 pub fn calibrate_pointer(
     recording: &Recording,
     rig: &Rig,

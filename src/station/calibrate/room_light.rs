@@ -1,5 +1,5 @@
-//! In: a board's picture in room light, one with the laser of the same pose, the board's place. Out: the laser's light
-//! alone, where the second picture holds room light too.
+//! In: a board's picture in room light, one with the laser at the same pose, the board's pose. Out: the laser's
+//! light alone, if the second picture contains room light too.
 //! Frame and unit: grey levels of the pictures' depth.
 
 use super::board_views::FrameBoard;
@@ -11,18 +11,18 @@ use crate::raster::{Image, Light};
 use crate::recording::{BoardSpec, Recording};
 use crate::stages::stripe::ambient::subtract;
 
-/// Pixels between two that are looked at, each way.
+/// Step between the pixels that are examined, px, in x and y.
 const STEP: usize = 3;
-/// Grey levels (8 bits) of the picture in room light below which a pixel says nothing of the exposures' ratio.
+/// Grey level (8 bits) of the picture in room light below which a pixel is not used for the ratio of the exposures.
 const DARK: f32 = 24.0;
-/// Fewest pixels of a board that tell the ratio.
+/// Fewest pixels of a board that determine the ratio.
 const LEAST: usize = 100;
-/// Grey levels (8 bits) that the room's light must leave on the bright print to be taken out: with less the laser's
+/// Smallest grey level (8 bits) of room light on the bright print for which it is subtracted; with less the laser's
 /// picture was taken in the dark, or through a filter.
 const LEFT: f32 = 4.0;
 
-/// How much of the room's light is in the laser's picture: the median ratio of both over the board, which the laser
-/// lights in a small part only. Two exposures of one room differ by this factor. 0 where it is none.
+/// Share of the room's light in the laser's picture: the median ratio of both pictures over the board, of which the
+/// laser covers only a small part. Two exposures of one room differ by this factor. 0 if there is no room light.
 pub fn share(
     laser: &Image,
     ambient: &Image,
@@ -59,7 +59,7 @@ pub fn share(
     if share * bright < LEFT * unit { 0.0 } else { share }
 }
 
-/// The laser's picture without the room's light.
+/// The laser's picture minus the room's light.
 pub fn without(laser: &Image, ambient: &Image, share: f32) -> Image {
     let full = u32::from(laser.full_scale());
     let room = ambient.to_f32().into_iter().map(|g| (g * share).round() as u32);
@@ -71,13 +71,13 @@ pub fn without(laser: &Image, ambient: &Image, share: f32) -> Image {
     }
 }
 
-/// The laser's picture of a board without the room's light, where there is any in it.
+/// The laser's picture of a board; room light is subtracted if it contains any.
 pub fn alone(laser: Image, ambient: &Image, b: &FrameBoard, camera: &Intrinsics) -> Image {
     let share = share(&laser, ambient, &b.board, &b.pose.camera_from_board, camera);
     if share > 0.0 { without(&laser, ambient, share) } else { laser }
 }
 
-/// Adds to a fault what one of the laser's pictures shows, as it was taken.
+/// Adds to a fault what one of the laser's pictures shows, without subtraction.
 pub fn lit(recording: &Recording, name: &str, fault: Fault) -> Fault {
     match recording.picture(name) {
         Ok(picture) => Light::of(&picture).explain(name, fault),

@@ -1,6 +1,7 @@
-//! In: stripe peaks of pictures, boards of known pose in them. Out: of each picture the peaks along the strongest
-//! straight line on its board (stage `hough`) and along a second one nearly as strong: a flat board cuts the sheet in
-//! a line, dots and halos do not lie on it; which of two lines is the sheet only all pictures together can tell.
+//! In: stripe peaks of pictures, boards of known pose in them. Out: for each picture the peaks along the strongest
+//! straight line on its board (stage `hough`), and along a second one that is nearly as strong. A flat board meets
+//! the sheet in a line; dots and halos do not lie on it. Only all pictures together decide which of two lines is
+//! the sheet.
 //! Frame and unit: pixels of a camera without lens distortion, in which the line is straight.
 
 use crate::calibrate::boards::extent::inside;
@@ -11,17 +12,17 @@ use crate::geometry::Vec2;
 use crate::gpu::Device;
 use crate::stages::stripe::hough::{HoughFrame, HoughParams, lines, vote};
 
-/// Half width of the line's surroundings in stripe sigmas, and at least 2 px: a centre that is farther off is
-/// another's.
+/// Half width of the band around the line, in stripe sigmas, at least 2 px: a peak farther off belongs to something
+/// else.
 const NEAR_WIDTHS: f64 = 3.0;
-/// Share of the strongest line's pixels from which on a second one is kept, too.
+/// Share of the strongest line's pixels from which a second line is retained too.
 const RIVAL: f64 = 0.4;
-/// Fewest peaks of a line; with fewer on the board nothing is left out, the solver judges them.
+/// Fewest peaks of a line; with fewer on the board nothing is excluded, and the solver judges the peaks.
 const LEAST: u32 = 10;
 
-/// Leaves out what does not lie along the line; pictures without one stay as they are.
+/// Excludes peaks that do not lie along a line; pictures without a line are not changed.
 pub fn keep_straight(views: &mut [StripeView], camera: &Intrinsics, device: Option<&Device>) -> Result<()> {
-    // Undistorted, the picture's corners leave it by less than a quarter of its size.
+    // After undistortion the picture's corners lie outside it by less than a quarter of its size.
     let margin = Vec2::new(f64::from(camera.width / 4), f64::from(camera.height / 4));
     let (width, height) = (camera.width + 2 * (camera.width / 4), camera.height + 2 * (camera.height / 4));
     let params = HoughParams { most: 2, least_pixels: LEAST, ..HoughParams::default() };

@@ -1,14 +1,14 @@
-//! Sets a value in a text of TOML, or takes one out, and leaves every comment in the text.
+//! Sets a value in a TOML text or removes one, and keeps every comment.
 //!
-//! `toml_edit` keeps comments with the entry that they stand beside, so a comment would go where its entry goes.
-//! Therefore an entry that is taken out is only marked, and what lies between the marks is cut out of the text. A
-//! comment within a value that is replaced moves to the line above.
+//! `toml_edit` stores a comment with the entry next to it, so removing an entry would remove its comment. Therefore
+//! an entry to be removed is only marked, and the text between the marks is cut out afterwards. A comment inside a
+//! replaced value moves to the line above.
 
 use crate::fault::{Fault, Result};
 use serde_json::Value as Json;
 use toml_edit::{Decor, DocumentMut, InlineTable, Item, Table, Value};
 
-/// A text that is being changed.
+/// A text that is being edited.
 pub(super) struct Document<'a> {
     before: &'a str,
     pub root: DocumentMut,
@@ -17,7 +17,7 @@ pub(super) struct Document<'a> {
 
 impl<'a> Document<'a> {
     /// # Errors
-    /// The text is no TOML.
+    /// The text is not valid TOML.
     pub fn parse(text: &'a str) -> Result<Document<'a>> {
         let root = text.parse().map_err(|e: toml_edit::TomlError| {
             Fault::input(format!("is not TOML: {}", e.to_string().trim_end())).next("correct the text")
@@ -26,15 +26,15 @@ impl<'a> Document<'a> {
         Ok(Document { before: text, root, mark })
     }
 
-    /// Sets the entry at a path of names; `None` takes it out, and with it a table that has nothing else.
+    /// Sets the entry at a path of names; `None` removes it, and also a table that has no other entry.
     ///
     /// # Errors
-    /// The path leads through something that is no table.
+    /// The path leads through something that is not a table.
     pub fn put(&mut self, path: &[&str], value: Option<&Json>) -> Result<()> {
         put(self.root.as_table_mut(), path, value, self.mark).map(|_| ())
     }
 
-    /// Takes an entry out of a list.
+    /// Removes an entry from a list.
     ///
     /// # Errors
     /// There is no such entry.
@@ -53,7 +53,7 @@ impl<'a> Document<'a> {
         Ok(())
     }
 
-    /// The changed text, with all comments of the former one.
+    /// The changed text, with all comments of the original.
     pub fn text(self) -> String {
         let Document { before, root, mark } = self;
         let made = root.to_string();
@@ -67,7 +67,7 @@ impl<'a> Document<'a> {
         if from == to {
             return format!("{head}{said}{tail}");
         }
-        // The line on which something was cut out has a comment left, or goes.
+        // The line from which something was cut keeps its remaining comment, or is removed.
         let line = tail.split('\n').next().unwrap_or_default();
         let left = if line.trim().is_empty() { &tail[(line.len() + 1).min(tail.len())..] } else { tail.trim_start() };
         let doubled = said.is_empty() && (head.is_empty() || head.ends_with("\n\n")) && line.trim().is_empty();
@@ -86,14 +86,14 @@ pub(super) fn comments(text: &str) -> Vec<&str> {
     said.map(|t| text[t.span().start()..t.span().end()].trim_end()).collect()
 }
 
-/// Comments of a text that another one lacks.
+/// Comments of a text that another text lacks.
 fn lost<'t>(before: &'t str, after: &str) -> Vec<&'t str> {
     let mut there = comments(after);
     let gone = |c: &&str| there.iter().position(|t| t == c).map(|i| there.swap_remove(i)).is_none();
     comments(before).into_iter().filter(gone).collect()
 }
 
-/// Whether an entry was taken out.
+/// Sets or removes an entry; returns whether it was removed.
 fn put(table: &mut Table, path: &[&str], value: Option<&Json>, mark: char) -> Result<bool> {
     let [name, rest @ ..] = path else { return Ok(false) };
     if !table.contains_key(name) {
@@ -103,7 +103,7 @@ fn put(table: &mut Table, path: &[&str], value: Option<&Json>, mark: char) -> Re
             return Ok(false);
         }
         let mut below = Table::new();
-        // Its line [name] is written where it holds a value itself.
+        // The line [name] is written only if the table has values itself.
         below.set_implicit(true);
         below.set_dotted(table.is_dotted());
         table.insert(name, Item::Table(below));
@@ -120,7 +120,7 @@ fn put(table: &mut Table, path: &[&str], value: Option<&Json>, mark: char) -> Re
         (Item::Table(below), Some(Json::Object(values))) => put_all(below, values, mark)?,
         (Item::Table(below), None) => cut_table(below, mark),
         (Item::ArrayOfTables(list), None) if rest.is_empty() => {
-            // One line stands for all of them.
+            // One entry represents all of them.
             while list.len() > 1 {
                 list.remove(list.len() - 1);
             }
@@ -139,7 +139,7 @@ fn put(table: &mut Table, path: &[&str], value: Option<&Json>, mark: char) -> Re
     Ok(value.is_none())
 }
 
-/// A table's entries are these and no others.
+/// Gives a table exactly these entries.
 fn put_all(table: &mut Table, values: &serde_json::Map<String, Json>, mark: char) -> Result<()> {
     let others: Vec<String> =
         table.iter().map(|(name, _)| name.to_owned()).filter(|name| !values.contains_key(name)).collect();
@@ -147,8 +147,8 @@ fn put_all(table: &mut Table, values: &serde_json::Map<String, Json>, mark: char
     values.iter().try_for_each(|(name, value)| put(table, &[name], Some(value), mark).map(|_| ()))
 }
 
-/// Changes a value or what is within its `{ }`; one that is taken out, or is empty then, is marked. Whether it
-/// was taken out.
+/// Changes a value or an entry within its `{ }`. A value that is removed, or becomes empty, is marked. Returns
+/// whether it was removed.
 fn put_value(whole: &mut Value, path: &[&str], value: Option<&Json>, mark: char) -> Result<bool> {
     match value {
         Some(value) if path.len() == 1 => replace(whole, plain(value)?),
@@ -163,7 +163,7 @@ fn put_value(whole: &mut Value, path: &[&str], value: Option<&Json>, mark: char)
     Ok(gone)
 }
 
-/// The same within `{ }`; the first name of the path is that of the whole.
+/// The same within `{ }`; the first name of the path is that of the whole value.
 fn put_inline(whole: &mut Value, path: &[&str], value: Option<&Json>) -> Result<()> {
     let [own, name, rest @ ..] = path else { return Ok(()) };
     let table = whole.as_inline_table_mut().ok_or_else(|| no_table(own))?;
@@ -196,7 +196,7 @@ pub(super) fn plain(value: &Json) -> Result<Value> {
     text.parse().map_err(|e: toml_edit::TomlError| refuse(e.to_string()))
 }
 
-/// Another value where the old one stands, number by number where both are lists.
+/// Replaces a value in place, element by element where both are lists.
 fn replace(old: &mut Value, mut new: Value) {
     match (&mut *old, &mut new) {
         (Value::Array(a), Value::Array(b)) => {
@@ -227,7 +227,7 @@ fn replace(old: &mut Value, mut new: Value) {
     }
 }
 
-/// Marks the line of a table, and all that it holds, to be cut out.
+/// Marks a table's line and all its content to be cut out.
 fn cut_table(table: &mut Table, mark: char) {
     table.clear();
     table.set_implicit(false);
@@ -235,13 +235,13 @@ fn cut_table(table: &mut Table, mark: char) {
     behind(table.decor_mut(), mark);
 }
 
-/// Puts the mark before an entry, behind the comments above it.
+/// Puts the mark before an entry, after the comments above it.
 fn before(decor: &mut Decor, mark: char) {
     let former = decor.prefix().and_then(|p| p.as_str()).unwrap_or_default();
     decor.set_prefix(format!("{former}{mark}"));
 }
 
-/// Puts the mark behind an entry, before the comment on its line.
+/// Puts the mark after an entry, before the comment on its line.
 fn behind(decor: &mut Decor, mark: char) {
     let former = decor.suffix().and_then(|s| s.as_str()).unwrap_or_default();
     decor.set_suffix(format!("{mark}{former}"));

@@ -1,4 +1,4 @@
-//! Changes a text of TOML that a person wrote: values change, comments stay.
+//! Edits a TOML text that a person wrote: values change, comments stay.
 
 mod document;
 mod recipe;

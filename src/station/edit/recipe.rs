@@ -1,4 +1,4 @@
-//! Adds a constructed point to a recipe's text, takes one out, and says where the tool goes.
+//! Adds a constructed point to a recipe's text, removes one, or sets the target of the insertion.
 
 use super::document::Document;
 use crate::fault::{Fault, Result};
@@ -10,10 +10,10 @@ use toml_edit::{ArrayOfTables, Item, Table};
 /// Key of the constructed points.
 const LIST: &str = "construction";
 
-/// The text with one point more, behind those that it may be built of.
+/// The text with one more point, after the points that it may be built from.
 ///
 /// # Errors
-/// The text is no recipe; the point cannot be built, or its name is taken.
+/// The text is not a recipe; the point cannot be built, or its name is already used.
 pub fn point_added(text: &str, point: &Construction) -> Result<String> {
     let mut wanted = Recipe::parse(text)?;
     wanted.construction.push(point.clone());
@@ -35,7 +35,7 @@ pub fn point_added(text: &str, point: &Construction) -> Result<String> {
     for (name, value) in fields.iter().filter(|(_, v)| !v.is_null()) {
         entry.insert(name, Item::Value(super::document::plain(value)?));
     }
-    // A first one stands before the insertion that may use it.
+    // The first point is placed before the insertion, which may use it.
     let insertion = doc.root.get("insertion").and_then(Item::as_table).and_then(Table::position);
     let list = doc.root.entry(LIST).or_insert(Item::ArrayOfTables(ArrayOfTables::new()));
     let list = list.as_array_of_tables_mut().ok_or_else(strange)?;
@@ -53,7 +53,7 @@ fn drop_nulls(value: &mut serde_json::Value) {
 /// The text without the point of that name.
 ///
 /// # Errors
-/// The text is no recipe, or something in it is built of that point.
+/// The text is not a recipe, or another part of it uses that point.
 pub fn point_taken_out(text: &str, name: &str) -> Result<String> {
     let mut wanted = Recipe::parse(text)?;
     let index = wanted.construction.iter().position(|c| c.name == name).ok_or_else(|| {
@@ -66,10 +66,10 @@ pub fn point_taken_out(text: &str, name: &str) -> Result<String> {
     checked(doc.text(), &wanted)
 }
 
-/// The text whose insertion goes to that point; `None`: to the part's own place.
+/// The text with that point as the insertion's target; `None`: the part's own pose.
 ///
 /// # Errors
-/// The text is no recipe, or has no such point.
+/// The text is not a recipe, or has no such point.
 pub fn point_chosen(text: &str, name: Option<&str>) -> Result<String> {
     let mut wanted = Recipe::parse(text)?;
     wanted.insertion.construction = name.unwrap_or("pose").to_owned();
@@ -79,7 +79,7 @@ pub fn point_chosen(text: &str, name: Option<&str>) -> Result<String> {
     checked(doc.text(), &wanted)
 }
 
-/// The text, if it says what it is to say.
+/// Returns the text if it parses to the wanted recipe.
 fn checked(text: String, wanted: &Recipe) -> Result<String> {
     if Recipe::parse(&text).is_ok_and(|r| r == *wanted) { Ok(text) } else { Err(strange()) }
 }
@@ -96,7 +96,7 @@ mod tests {
     use crate::find::measure::construct::Build;
     use crate::station::edit::document::comments;
 
-    /// A recipe as it ships, with a comment above and beside every line.
+    /// A recipe as shipped, with a comment above and beside every line.
     fn commented() -> String {
         let text = include_str!("../../../data/recipes/led.toml");
         let beside = |l: &str| if l.trim().is_empty() || l.contains('#') { String::new() } else { " # beside".into() };
@@ -143,7 +143,7 @@ mod tests {
                 keeps_comments(&text, &point_chosen(&to, None).unwrap());
             }
         }
-        // From the last to the first, with the insertion's own names out of the way.
+        // Removed from last to first, after the insertion's own names.
         now = now.replace("two_pin = \"two pins\"", "").replace("lattice = \"all pins\"", "");
         for c in named(&now).iter().rev() {
             let without = point_taken_out(&now, &c.name).unwrap();

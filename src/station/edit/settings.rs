@@ -1,4 +1,4 @@
-//! Changes settings in the text of a station.toml by their names with dots; comments, order and blank lines stay.
+//! Changes settings in the text of a station.toml by their dotted names; comments, order and blank lines stay.
 
 use super::document::Document;
 use crate::fault::{Fault, Result};
@@ -6,10 +6,10 @@ use crate::station::settings::Settings;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// Changes settings; `null` takes one out.
+/// Changes settings; `null` removes one.
 ///
 /// # Errors
-/// Names that are no setting, values that a station cannot have; the text is refused as a whole then.
+/// Names that are not settings, or values that a station cannot have; then the whole change is refused.
 pub fn edited(text: &str, changes: &BTreeMap<String, Value>) -> Result<String> {
     let meant = meant(text, changes)?;
     let mut made = text.to_owned();
@@ -27,7 +27,7 @@ pub fn edited(text: &str, changes: &BTreeMap<String, Value>) -> Result<String> {
         .next("change the text itself"))
 }
 
-/// What the changed text is to say, whatever its layout.
+/// The content that the changed text must have, whatever its layout.
 fn meant(text: &str, changes: &BTreeMap<String, Value>) -> Result<toml::Table> {
     Settings::parse(text)?;
     let mut all: toml::Table = toml::from_str(text).unwrap_or_default();
@@ -48,7 +48,7 @@ fn meant(text: &str, changes: &BTreeMap<String, Value>) -> Result<toml::Table> {
     Ok(pruned(all))
 }
 
-/// A table without a setting is none.
+/// Removes tables without any setting.
 fn pruned(table: toml::Table) -> toml::Table {
     let below = |value| match value {
         toml::Value::Table(t) => Some(pruned(t)).filter(|t| !t.is_empty()).map(toml::Value::Table),
@@ -57,11 +57,11 @@ fn pruned(table: toml::Table) -> toml::Table {
     table.into_iter().filter_map(|(name, value)| Some((name, below(value)?))).collect()
 }
 
-/// The settings themselves, changed and checked; names are those within a table, with dots (`below`: "" or
+/// The settings themselves, changed and checked. Names are dotted and relative to the table `below` ("" or
 /// "extraction").
 ///
 /// # Errors
-/// Names that are no setting, values that a station cannot have.
+/// Names that are not settings, or values that a station cannot have.
 pub fn changed(settings: &Settings, below: &str, changes: &BTreeMap<String, Value>) -> Result<Settings> {
     let mut all = serde_json::to_value(settings).expect("plain data");
     for (key, value) in changes {
@@ -81,7 +81,7 @@ pub fn changed(settings: &Settings, below: &str, changes: &BTreeMap<String, Valu
             at.insert(name.to_owned(), value.clone())
         };
     }
-    // A table without its last setting is none.
+    // A table without any setting left is removed.
     let all: serde_json::Map<String, Value> = match all {
         Value::Object(map) => map.into_iter().filter(|(_, v)| v.as_object().is_none_or(|o| !o.is_empty())).collect(),
         _ => Default::default(),
@@ -124,7 +124,7 @@ mod tests {
         );
     }
 
-    /// One layout in tables, one in dotted names, one within braces; lists and braces over several lines.
+    /// One layout with tables, one with dotted names, one with braces; lists and braces over several lines.
     const LAYOUTS: [&str; 3] = [
         "name = \"cell # 3\"\nrobot = \"denso\"\nmount = 'eye-in-hand'\ntolerance_mm = 0.1\n\n\
          [working_volume]\nnear_mm = 60\nfar_mm = 320\n\n\
@@ -143,7 +143,7 @@ mod tests {
          motion = { speed_mm_s = 40, workspace = { from_mm = [150, -350, 200], to_mm = [650, 350, 750] } }\n",
     ];
 
-    /// What the pages change, with two values each.
+    /// Settings that the pages change, with two values each.
     fn changes() -> Vec<(&'static str, [Value; 2])> {
         let numbers = ["working_volume.near_mm", "working_volume.far_mm", "motion.speed_mm_s", "motion.max_step_mm"]
             .into_iter()
@@ -166,13 +166,13 @@ mod tests {
         all
     }
 
-    /// With a comment above and beside every line.
+    /// The text with a comment above and beside every line.
     fn commented(text: &str) -> String {
         text.lines().enumerate().map(|(i, l)| format!("# above {i}.\n  {l} # beside {i}.\n")).collect::<String>()
             + "# end."
     }
 
-    /// Every value of a text by its name with dots.
+    /// Collects every value of a text by its dotted name.
     fn values(table: &toml::Table, before: &str, out: &mut BTreeMap<String, toml::Value>) {
         for (name, value) in table {
             match value {
@@ -188,7 +188,7 @@ mod tests {
         out
     }
 
-    /// The changed text, after a look at every comment and value in it; `None` where a station cannot have that value.
+    /// The changed text, after checking every comment and value in it; `None` if a station cannot have that value.
     fn judged(first: &str, text: &str, key: &str, value: &Value) -> Option<String> {
         let mut wanted = read(text);
         wanted.retain(|name, _| name != key && !name.starts_with(&format!("{key}.")));

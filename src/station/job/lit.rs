@@ -1,5 +1,5 @@
-//! In: an arm that stands over the board, a camera, the line on its output. Out: that the line is seen, from one
-//! picture, before a sweep is made with it.
+//! In: an arm that stands over the board, a camera, the line laser's output. Out: whether one picture shows the
+//! line, before a sweep is made with it.
 //! Frame and unit: points of one shot, counted.
 
 use super::eye::Eye;
@@ -15,10 +15,10 @@ use crate::station::scan::recorded::scan_recording;
 use crate::station::settings::Settings;
 use std::path::Path;
 
-/// A stripe over the board has at least so many points as a share of the picture's short side.
+/// Fewest points of a stripe over the board, as a share of the picture's short side.
 pub(super) const LEAST_SHARE: f64 = 0.1;
 
-/// Refuses where a picture with the line on has no stripe at a depth that can be.
+/// Refuses if a picture with the line on has no stripe at a possible depth.
 pub fn line_is_seen(eye: &mut Eye, arm: &mut dyn Arm, rig: &Rig, settings: &Settings, folder: &Path) -> Result<()> {
     let mut record = Record::begin(folder, "is the line seen", Beam::Line, eye.pictures())?;
     let shot = shoot(eye, arm, &mut record, Some(Beam::Line));

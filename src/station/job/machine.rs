@@ -1,5 +1,5 @@
 //! In: a job's state, a robot behind its rules, a camera, a station, a recipe, a person. Out: the job done, or
-//! stopped where it says. A crash at any moment leaves a state from which it goes on or backs out.
+//! stopped with its phase stored. After a crash at any moment the stored state allows it to resume or back out.
 //! Frame and unit: base frame; mm, mm/s, degrees, s.
 
 use super::eye::Eye;
@@ -27,7 +27,7 @@ use crate::station::settings::Settings;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// What a job works on.
+/// Inputs and options of a job.
 #[derive(Clone, Debug)]
 pub struct JobOptions {
     /// Folder of the station.
@@ -36,14 +36,14 @@ pub struct JobOptions {
     pub recipe: PathBuf,
     /// Folder of the job: its state, recordings, scan, report.
     pub out: PathBuf,
-    /// Notation of the poses that are said.
+    /// Notation of the poses that are shown.
     pub robot: Convention,
     /// Where the scan's stages run.
     pub place: Where,
-    /// Speed of every motion, mm/s; `None`: the station's.
+    /// Speed of every motion, mm/s; `None`: the station's limit.
     pub speed_mm_s: Option<f64>,
-    /// The line sweeps over so much about the picture's middle, mm, 5 to 1000; `None`: over the part, an eighth of the
-    /// field's short side to both sides, at most over that side.
+    /// Length of the line's sweep about the picture's middle, mm, 5 to 1000. `None`: over the part plus an eighth
+    /// of the field's short side on both sides, at most that short side.
     pub sweep_mm: Option<f64>,
     /// Largest angle between the part's top and the touched board, degrees, 0.1 to 20.
     pub max_tilt_deg: f64,
@@ -63,21 +63,21 @@ pub struct Job<'a> {
     since: Instant,
 }
 
-/// Back out of a job that knows the board but no part yet: so far off the board, mm.
+/// How far the tool backs away from the board in a job that knows the board but no part yet, mm.
 const AWAY_MM: f64 = 30.0;
-/// Shorter ways are none: an arm reads its own pose to some hundredths of a millimetre.
+/// Shorter motions are not made: an arm reads its own pose to some hundredths of a millimetre.
 const LEAST_WAY_MM: f64 = 0.05;
-/// A part whose pose is not known well enough is swept again so often, in steps half as long each time.
+/// How often the sweep is repeated for a part whose pose is too uncertain, each time with half the step.
 pub(super) const HALVINGS: u32 = 1;
-/// A sweep is moved so often towards a part that goes on beyond its rim: from a piece of a part the way is known
-/// roughly.
+/// How often the sweep is moved towards a part that extends beyond the scan's edge; a piece of a part gives the
+/// direction only roughly.
 pub(super) const MOVES: usize = 2;
 
 impl<'a> Job<'a> {
-    /// Begins the job of a folder, or goes on with the one that stands there.
+    /// Begins a job in a folder, or resumes the one that is stored there.
     ///
     /// # Errors
-    /// What is needed of the station is not there, or options are out of range.
+    /// Something that the job needs is missing in the station, or options are out of range.
     pub fn open(
         options: &'a JobOptions,
         guard: &'a mut Guard,
@@ -110,13 +110,14 @@ impl<'a> Job<'a> {
             }
             None => JobState { made_from, ..JobState::new(guard.link().pose()?.base_from_flange) },
         };
-        // The first thing that is done: what a program that was killed left lit goes off.
+        // The first action switches off what a killed program left on.
         let lights = Switchboard::of(guard.link(), settings.outputs.unwrap_or_default())?;
         let eye = Eye::new(camera, lights);
         Ok(Job { options, settings, rig, recipe, guard, eye, operator, state, found: None, since: Instant::now() })
     }
 
-    /// Does what is left. Whatever stops it, the report says why; the arm stands still then, and the lasers are off.
+    /// Does the remaining steps. If anything stops the job, the report says why; the arm then stands still and the
+    /// lasers are off.
     ///
     /// # Errors
     /// The job's own files cannot be written.
@@ -125,7 +126,7 @@ impl<'a> Job<'a> {
         self.eye.lights.after(done)
     }
 
-    /// Goes back up instead of on, and ends there.
+    /// Goes back up instead of on, and ends the job there.
     ///
     /// # Errors
     /// As [`Job::run`].
@@ -140,7 +141,7 @@ impl<'a> Job<'a> {
         self.pick_up()?;
         while !self.state.stopped && self.state.resumes() != Resumes::Over {
             let step = self.step();
-            // Before anything is written: a disk that is full does not keep a laser on.
+            // Before anything is written, so that a full disk does not keep a laser on.
             let step = self.eye.lights.after(step);
             self.tick();
             match step {
@@ -160,7 +161,7 @@ impl<'a> Job<'a> {
         Ok(report)
     }
 
-    /// Takes up what was stopped or cut off: before the part it measures anew, at the part it goes back up.
+    /// Resumes what was stopped or interrupted: before the part it measures again, at the part it goes back up.
     fn pick_up(&mut self) -> Result<()> {
         if self.state.moving {
             let cut_off = "the last motion was cut off: where the arm is was not known, look at the robot";
@@ -181,7 +182,7 @@ impl<'a> Job<'a> {
         self.store()
     }
 
-    /// What has passed since is the present phase's.
+    /// Adds the time passed to the current phase.
     fn tick(&mut self) {
         let passed = std::mem::replace(&mut self.since, Instant::now()).elapsed().as_secs_f64();
         self.state.seconds += passed;
@@ -214,7 +215,7 @@ impl<'a> Job<'a> {
         Motion { to, way: Way::Straight, speed_mm_s: self.speed() }
     }
 
-    /// Proposes, asks, writes down that something moves, moves, writes down that it has ended.
+    /// Proposes a motion, asks, stores that it begins, executes it, and stores that it has ended.
     pub(super) fn go(
         &mut self,
         step: &'static str,
@@ -230,7 +231,7 @@ impl<'a> Job<'a> {
         self.store()?;
         let eye = &mut self.eye;
         let made = self.guard.make(&proposal, yes, &mut |arm, k| each(eye, arm, k));
-        // What follows may take long: somebody is asked, or pictures are measured.
+        // What follows may take long: a person is asked, or pictures are measured.
         let made = self.eye.lights.after(made);
         self.operator.over();
         made?;
@@ -238,7 +239,7 @@ impl<'a> Job<'a> {
         self.store()
     }
 
-    /// Proposes until somebody has said yes or no.
+    /// Proposes until a person has answered yes or no.
     fn agreed(
         &mut self,
         step: &'static str,
@@ -267,11 +268,11 @@ impl<'a> Job<'a> {
         Plan { name: name.into(), why, legs, evidence }
     }
 
-    /// Looks squarely at the board, and sweeps the line over it.
+    /// Moves the camera to its square view of the board and sweeps the line over it.
     fn scan(&mut self) -> Result<Phase> {
         let Some([centre, normal]) = self.state.surface else { return Ok(Phase::Touch) };
         line_is_seen(&mut self.eye, self.guard.link(), &self.rig, &self.settings, &self.options.out.join("lit"))?;
-        // The camera looks from where the job began, moved along the board.
+        // The view starts at the job's first pose, shifted along the board.
         let moved: Vec3 = self.state.moved_mm.iter().sum();
         let start = Rigid::new(self.state.start.rotation, self.state.start.translation + moved);
         let board = Board { start, surface: [centre, normal] };
@@ -318,7 +319,7 @@ impl<'a> Job<'a> {
         let tilt = report.base_from_part.direction(&Vec3::z()).dot(&normal).clamp(-1.0, 1.0).acos().to_degrees();
         let (poses, reasons) = (report.poses.clone(), report.reasons.join("; "));
         let there = report.cut_off.as_ref().and_then(|cut| self.sweep_there(cut, normal));
-        // The right part, but not known well enough: more shots are more evidence.
+        // The right part, but its pose is too uncertain: more shots give more data.
         let closer = report.gates.iter().all(|g| g.passed || g.name.starts_with("sigma"));
         self.operator.tell(&format!(
             "'{}' with score {:.3}, {tilt:.2} degrees off the board",
@@ -349,8 +350,8 @@ impl<'a> Job<'a> {
         Ok(Phase::Approach)
     }
 
-    /// The sweep again, moved along the board towards a part that goes on beyond its rim. The rules of motion judge it
-    /// like any other, and somebody confirms it. `None`: it was moved often enough.
+    /// Repeats the sweep, moved along the board towards a part that extends beyond the scan's edge. The motion
+    /// rules judge it like any other, and a person confirms it. `None`: it was moved often enough.
     fn sweep_there(&mut self, cut: &CutOff, normal: Vec3) -> Option<Phase> {
         if self.state.moved_mm.len() >= MOVES {
             return None;
@@ -361,8 +362,7 @@ impl<'a> Job<'a> {
         Some(Phase::Scan)
     }
 
-    /// What was found, for those who look: the report, its picture, and what the camera sees of the part in the
-    /// room's light.
+    /// Stores the result for viewers: the report, its picture, and the camera's picture of the part in room light.
     fn keep(&mut self, report: &Report) -> Result<()> {
         let text = serde_json::to_string_pretty(report).expect("plain data");
         let png = picture::draw(report, &self.recipe.drawing()).to_png();
@@ -374,7 +374,7 @@ impl<'a> Job<'a> {
         Ok(())
     }
 
-    /// What a motion towards the part rests on.
+    /// The evidence for a motion towards the part.
     fn evidence(&self) -> Result<Evidence> {
         let scan = load_report(&self.options.out.join("scan"))?;
         let mut measured: Vec<Gate> = self.found.as_ref().map_or(Vec::new(), |f| f.gates.clone());
@@ -393,7 +393,7 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// Of a job that is taken up after a crash: what was found is found again, in the same scan.
+    /// Finds the part again in the same scan, for a job that is resumed after a crash.
     fn found_again(&mut self) -> Result<()> {
         if self.found.is_some() || self.find()? == Phase::Approach {
             return Ok(());
@@ -406,7 +406,7 @@ impl<'a> Job<'a> {
     fn approach(&mut self) -> Result<Phase> {
         self.found_again()?;
         let [above, ..] = self.state.poses.expect("found");
-        // Sideways at the height where it stands, then down: nothing is crossed that was not seen.
+        // First sideways at the present height, then down, so that the arm crosses no space that was not seen.
         let at = self.guard.link().pose()?.base_from_flange;
         let normal = self.state.surface.map_or(Vec3::z(), |s| s[1]);
         let higher = (at.translation - above.translation).dot(&normal).max(0.0);
@@ -437,7 +437,7 @@ impl<'a> Job<'a> {
         Ok(Phase::Retract)
     }
 
-    /// Up along the way down, also from a motion that was cut off.
+    /// Goes up along the insertion's path, also after an interrupted motion.
     fn retract(&mut self) -> Result<Phase> {
         let at = self.guard.link().pose()?.base_from_flange;
         let up = match (self.state.poses, self.state.surface) {
@@ -462,9 +462,8 @@ impl<'a> Job<'a> {
     }
 }
 
-/// From where the arm stands up to the height of the retract pose, along the way from the insertion to it; nothing
-/// where it is that
-/// high already.
+/// The motion from the arm's position up to the height of the retract pose, along the line from the insertion pose
+/// to it; zero if the arm is already that high.
 fn way_up(at: &Vec3, down: &Vec3, up: &Vec3) -> Result<Vec3> {
     let way = up - down;
     if !(way.norm() > LEAST_WAY_MM && way.norm().is_finite()) {
@@ -481,11 +480,11 @@ fn way_up(at: &Vec3, down: &Vec3, up: &Vec3) -> Result<Vec3> {
     }
     let axis = way.normalize();
     let mm = (up - at).dot(&axis);
-    // A height that is no number is no height that is reached.
+    // A NaN height does not count as reached.
     Ok(if mm <= 0.0 { Vec3::zeros() } else { axis * mm })
 }
 
-/// Refuses a plan with a leg that is no pose: it is neither made nor left out.
+/// Refuses a plan with a leg that is not a finite pose: such a leg is neither executed nor skipped.
 fn finite(plan: &Plan) -> Result<()> {
     let numbers = |leg: &Motion| leg.to.to_rows().iter().all(|x| x.is_finite()) && leg.speed_mm_s.is_finite();
     match plan.legs.iter().position(|leg| !numbers(leg)) {

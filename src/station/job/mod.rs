@@ -1,6 +1,6 @@
 //! In: a robot behind its rules, a camera, a station, a recipe, a person who confirms. Out: touch, square, scan,
 //! find, approach, insert, retract: one state machine with its state on disk. The command line, the screen and
-//! scripts run this one.
+//! scripts all run it.
 //! Frame and unit: base frame; mm, degrees.
 
 pub(in crate::station) mod eye;

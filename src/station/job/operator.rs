@@ -1,15 +1,15 @@
-//! In: what a job is about to do. Out: a person's yes or no; what he is told.
+//! In: the next action of a job. Out: a person's yes or no; messages for that person.
 //! Frame and unit: none.
 
 use crate::arm::rules::{Confirmation, Proposal};
 use crate::fault::Result;
 
-/// What a person is asked.
+/// A question for a person.
 #[derive(Clone, Debug)]
 pub struct Ask<'a> {
-    /// One or two words, as the steps are called.
+    /// Name of the step, one or two words.
     pub step: &'static str,
-    /// What was found, a sentence a line.
+    /// The findings, one sentence a line.
     pub says: Vec<String>,
     /// The question.
     pub question: &'static str,
@@ -17,20 +17,20 @@ pub struct Ask<'a> {
     pub proposal: &'a Proposal,
 }
 
-/// A person, or what stands for one.
+/// A person, or a program that replaces one.
 pub trait Operator {
-    /// Shows a motion and asks. `None` is a no.
+    /// Shows a motion and asks for confirmation. `None` means no.
     fn confirm(&mut self, ask: &Ask) -> Result<Option<Confirmation>>;
-    /// Whether the last question was left without an answer for so long that it is to be asked anew, from how things
-    /// are then.
+    /// Whether the last question remained unanswered for so long that it has to be asked again with the situation
+    /// then.
     fn again(&mut self) -> bool {
         false
     }
-    /// The motion that was confirmed has ended, or was stopped.
+    /// The confirmed motion has ended, or was stopped.
     fn over(&mut self) {}
-    /// Asks whether a person has looked at the robot; `why` says what was not known. Only a person's own act makes
-    /// this true, or a robot that is a simulated one.
+    /// Asks whether a person has looked at the robot; `why` says what was unknown. Only an act of a person, or a
+    /// simulated robot, makes this true.
     fn looked(&mut self, why: &str) -> Result<bool>;
-    /// Says what happens.
+    /// Reports an event.
     fn tell(&mut self, line: &str);
 }

@@ -1,43 +1,44 @@
-//! In: a step, a speed, what camera, chain and arm can. Out: speed, step and pictures a second that go together, and
-//! which of the three allows no more. Pure.
+//! In: a step, a speed, the capabilities of camera, chain and arm. Out: matching speed, step and picture rate, and
+//! which of the three limits them. Pure.
 //! Frame and unit: mm/s, mm a shot, pictures a second (Hz), s.
 
 use crate::fault::{Fault, Result};
 
-/// What can be; none: nobody knows.
+/// The limits of camera, chain and motion; `None`: unknown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Can {
-    /// Pictures a second that the camera sends.
+    /// The camera's picture rate, Hz.
     pub camera_hz: Option<f64>,
-    /// Pictures a second that were measured on this machine.
+    /// The picture rate measured on this machine, Hz.
     pub chain_hz: Option<f64>,
     /// Fastest motion that the station allows, mm/s.
     pub speed_mm_s: Option<f64>,
 }
 
-/// How fast a scan that does not stop for its pictures goes.
+/// Speed of a scan that does not stop for its pictures.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Pace {
-    /// Of what moves, mm/s.
+    /// Speed of the moving part, mm/s.
     pub speed_mm_s: f64,
-    /// From one shot to the next, mm.
+    /// Distance between shots, mm.
     pub step_mm: f64,
-    /// Pictures a second that this takes.
+    /// Required picture rate, Hz.
     pub rate_hz: f64,
-    /// Over the whole length, s.
+    /// Duration over the whole length, s.
     pub seconds: f64,
-    /// camera, chain or speed: the one that allows no more, or less than this; none: nothing is known that does.
+    /// camera, chain or speed: the one that limits the pace or is exceeded by it; `None`: no known limit is
+    /// reached.
     pub limited_by: Option<&'static str>,
-    /// The fastest that each of them bears at this step, mm/s.
+    /// The fastest speed that each of them allows at this step, mm/s.
     pub bears: Vec<(&'static str, f64)>,
-    /// The step that is left at this speed where camera or chain are slower than it asks, mm.
+    /// The step that results at this speed if camera or chain are too slow, mm.
     pub left_step_mm: f64,
 }
 
-/// The pace at a step over a length; without a speed the fastest that all bear.
+/// The pace at a step over a length; without a speed the fastest that all limits allow.
 ///
 /// # Errors
-/// A step, length or speed that is none; without a speed: nothing is known that limits it.
+/// A step, length or speed that is not positive and finite; without a speed: no limit is known.
 pub fn pace(step_mm: f64, speed_mm_s: Option<f64>, length_mm: f64, can: &Can) -> Result<Pace> {
     let stated = [("step", Some(step_mm)), ("length", Some(length_mm)), ("speed", speed_mm_s)];
     let rates = [("camera's rate", can.camera_hz), ("chain's rate", can.chain_hz), ("limit of speed", can.speed_mm_s)];
@@ -60,7 +61,7 @@ pub fn pace(step_mm: f64, speed_mm_s: Option<f64>, length_mm: f64, can: &Can) ->
         step_mm,
         rate_hz: speed / step_mm,
         seconds: length_mm / speed,
-        // To a millionth: a speed that was reckoned from a limit meets it.
+        // Tolerance of a millionth, so that a speed computed from a limit counts as reaching it.
         limited_by: least.filter(|l| speed >= l.1 * (1.0 - 1e-6)).map(|l| l.0),
         bears,
         left_step_mm: step_mm.max(speed / slowest),
@@ -68,7 +69,7 @@ pub fn pace(step_mm: f64, speed_mm_s: Option<f64>, length_mm: f64, can: &Can) ->
 }
 
 impl Pace {
-    /// In a sentence.
+    /// The pace as a sentence.
     pub fn words(&self) -> String {
         let mut said = format!(
             "{:.1} mm/s, {:.3} mm a shot, {:.1} pictures a second, {:.1} s",
@@ -94,10 +95,10 @@ mod tests {
         let p = pace(0.2, None, 60.0, &can).unwrap();
         assert_eq!((p.limited_by, p.speed_mm_s, p.rate_hz, p.seconds), (Some("camera"), 6.0, 30.0, 10.0));
         assert_eq!(p.bears, [("camera", 6.0), ("chain", 40.0), ("speed", 50.0)]);
-        // Coarser: the arm limits. Slower than all of them: nothing does.
+        // A coarser step: the arm limits. Slower than all of them: nothing limits.
         assert_eq!(pace(2.0, None, 60.0, &can).unwrap().limited_by, Some("speed"));
         assert_eq!(pace(0.2, Some(5.0), 60.0, &can).unwrap().limited_by, None);
-        // Faster than the camera bears: steps of what is left.
+        // Faster than the camera allows: the resulting steps are longer.
         let fast = pace(0.2, Some(12.0), 60.0, &can).unwrap();
         assert_eq!((fast.limited_by, fast.left_step_mm), (Some("camera"), 0.4));
         assert!(fast.words().contains("the camera allows no more: 0.400 mm a shot are left"), "{}", fast.words());

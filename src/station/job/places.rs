@@ -1,18 +1,18 @@
-//! In: where the camera stands, how far the board is, how the beams lie in the camera's frame. Out: flange poses from
-//! which the pointer touches the board around the picture's middle, and along which the line sweeps over it; which
-//! touches are the board's. Pure.
+//! In: the camera's pose, the distance of the board, the beams in the camera's frame. Out: flange poses for
+//! touching the board with the pointer around the picture's middle, and for sweeping the line over it; which
+//! touches lie on the board. Pure.
 //! Frame and unit: base_from_flange, mm.
 
 use crate::geometry::{Base, Camera, Flange, Plane, Ray, Rigid, Vec2, Vec3};
 
-/// Touches lie at these shares of the field around its middle, on eight sides: where one side of the picture lies
-/// beside the board, or a part fills it, six are left on the board, and no other plane has more than four (two rows
-/// of three would have six).
+/// Positions of the touches around the field's middle, as shares of the field, on eight sides. If one side of the
+/// picture is beside the board or covered by a part, six remain on the board, and no other plane has more than four
+/// (two rows of three would have six).
 pub(super) const TOUCHES: [[f64; 2]; 8] =
     [[-1.0, -0.5], [-0.5, -1.0], [0.5, -1.0], [1.0, -0.5], [1.0, 0.5], [0.5, 1.0], [-0.5, 1.0], [-1.0, 0.5]];
 
-/// Flange poses from which the pointer's spots lie around `middle`, `half` mm to each side: a place of the board in
-/// the frame of the camera as it stands now. The camera goes to `then` from the board.
+/// Flange poses that place the pointer's spots around `middle`, `half` mm to each side. `middle` is a point of the
+/// board in the camera's present frame. The camera's distance from the board becomes `then`.
 pub fn touches(
     base_from_camera: &Rigid<Base, Camera>,
     flange_from_camera: &Rigid<Flange, Camera>,
@@ -29,29 +29,30 @@ pub fn touches(
     TOUCHES.iter().map(place).collect()
 }
 
-/// Indices of the touches that lie within `gate` mm of one plane, the most that do; empty where that is not more than
-/// half of them.
+/// Indices of the largest set of touches within `gate` mm of one plane; empty if that is not more than half of
+/// them.
 pub fn on_one_plane(points: &[Vec3], gate: f64) -> Vec<usize> {
     let most = planes(points, gate).max_by(|a, b| a.0.len().cmp(&b.0.len()).then(b.1.total_cmp(&a.1)));
     most.map(|m| m.0).filter(|on| 2 * on.len() > points.len()).unwrap_or_default()
 }
 
-/// Middle of the touches, in the camera's frame, that lie within `gate` mm of one plane: of the most, of as many the
-/// ones nearest to the camera, for a board lies on a table. `None` where no four do; three always lie on a plane.
+/// Mean, in the camera's frame, of the largest set of touches within `gate` mm of one plane. Of equal sets the one
+/// nearest to the camera is used, because a board lies on a table. `None` if no four touches fit: three always lie
+/// on a plane.
 pub fn most_on_one_plane(points: &[Vec3], gate: f64) -> Option<Vec3> {
     let middle = |on: &[usize]| on.iter().map(|&i| points[i]).sum::<Vec3>() / on.len() as f64;
     let four = planes(points, gate).filter(|p| p.0.len() >= 4).map(|p| (p.0.len(), middle(&p.0)));
     four.max_by(|a, b| a.0.cmp(&b.0).then(b.1.z.total_cmp(&a.1.z))).map(|m| m.1)
 }
 
-/// The planes through three touches each: which touches lie within `gate` mm of one, and the sum of their squared
+/// The planes through three touches each: the touches within `gate` mm of each plane, and the sum of their squared
 /// distances.
 fn planes(points: &[Vec3], gate: f64) -> impl Iterator<Item = (Vec<usize>, f64)> {
     let n = points.len();
     let through = move |(i, j, k): (usize, usize, usize)| {
         let normal = (points[j] - points[i]).cross(&(points[k] - points[i]));
         let size = (points[j] - points[i]).norm() * (points[k] - points[i]).norm();
-        // Three in a row have no plane.
+        // Three touches in a row define no plane.
         (normal.norm() > 0.1 * size).then(|| (normal.normalize(), points[i]))
     };
     let three = (0..n).flat_map(|i| (0..i).flat_map(move |j| (0..j).map(move |k| (i, j, k))));
@@ -63,8 +64,8 @@ fn planes(points: &[Vec3], gate: f64) -> impl Iterator<Item = (Vec<usize>, f64)>
     })
 }
 
-/// Flange poses of a sweep: the camera looks as it does at `square`, `depth` from the board, and goes along the
-/// direction across its stripe so that the stripe passes over `length` mm about the foot of the axis, in steps.
+/// Flange poses of a sweep. The camera keeps the orientation of `square`, `depth` from the board. It moves across
+/// its stripe, so that the stripe passes over `length` mm about the foot of the axis, in steps.
 pub fn sweep(
     square: &Rigid<Base, Flange>,
     flange_from_camera: &Rigid<Flange, Camera>,
@@ -75,7 +76,7 @@ pub fn sweep(
 ) -> Vec<Rigid<Base, Flange>> {
     let across = Vec2::new(plane.normal.x, plane.normal.y);
     let d = across / across.norm();
-    // Where the stripe is along that direction, at the board.
+    // Position of the stripe on the board along that direction.
     let stripe = (plane.offset - plane.normal.z * depth) / across.norm();
     let shots = (length / step).ceil().max(1.0) as usize + 1;
     (0..shots)
@@ -97,14 +98,14 @@ mod tests {
             |x: f64, y: f64| Vec3::new(50.0 * x, 40.0 * y, 3.0 * x - 5.0 * y + 0.02 * (7.0 * x + 3.0 * y).sin());
         let board: Vec<Vec3> = TOUCHES.iter().map(|&[x, y]| tilted(x, y)).collect();
         assert_eq!(on_one_plane(&board, 0.3).len(), 8);
-        // A side of the picture is beside the board.
+        // One side of the picture is beside the board.
         let mut low = board.clone();
         (5..7).for_each(|i| low[i].z -= 6.0);
         assert_eq!(on_one_plane(&low, 0.3), [0, 1, 2, 3, 4, 7]);
-        // Half of it is: two planes of four, and nobody knows which is the board.
+        // Half of the picture is beside it: two planes of four, and the board cannot be identified.
         [4, 7].into_iter().for_each(|i| low[i].z -= 6.0);
         assert!(on_one_plane(&low, 0.3).is_empty());
-        // The nearer of them says where to look for more, from a camera 300 mm above.
+        // From a camera 300 mm above, the nearer plane indicates where to touch again.
         let from_camera = |p: &Vec3| Vec3::new(p.x, -p.y, 300.0 - p.z);
         let seen: Vec<Vec3> = low.iter().map(from_camera).collect();
         let near = from_camera(&(board[..4].iter().sum::<Vec3>() / 4.0));
@@ -142,7 +143,7 @@ mod tests {
         let square = camera * hand_eye.inverse();
         let path = sweep(&square, &hand_eye, &plane, 310.0, 50.0, 0.5);
         assert_eq!(path.len(), 101);
-        // Where the sheet cuts the floor, nearest to the axis' foot: from -25 to 25 mm across the stripe.
+        // Where the sheet meets the floor, nearest to the axis' foot: from -25 to 25 mm across the stripe.
         let at = |flange: &Rigid<Base, Flange>| {
             let sheet = (*flange * hand_eye).plane(&plane);
             let n = Vec2::new(sheet.normal.x, sheet.normal.y);

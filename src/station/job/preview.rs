@@ -1,5 +1,5 @@
-//! In: a station, a recipe, what is known of board, camera and chain. Out: the sweep that a job would make, and how
-//! fast a scan along it goes, before anything moves.
+//! In: a station, a recipe, data on board, camera and chain. Out: the sweep that a job would make and its possible
+//! speed, before anything moves.
 //! Frame and unit: base frame; mm, mm/s, pictures a second.
 
 use super::pace::{Can, Pace, pace};
@@ -11,50 +11,50 @@ use crate::geometry::{Base, Flange, Rigid};
 use crate::rig::Rig;
 use crate::station::settings::Settings;
 
-/// What is asked for; what is left open is the station's own.
+/// Options of a preview; `None` means the station's own value.
 #[derive(Clone, Debug, Default)]
 pub struct PreviewOptions {
-    /// A job that touched the board already.
+    /// State of a job that has already touched the board.
     pub job: Option<JobState>,
-    /// Where the flange stands.
+    /// Flange pose of the camera's view of the board.
     pub start: Option<Rigid<Base, Flange>>,
-    /// Where the flange stands when a picture is drawn over; `None`: there.
+    /// Flange pose of the picture that is drawn over; `None`: the same.
     pub now: Option<Rigid<Base, Flange>>,
-    /// From the camera to the board along its axis, mm, before it was touched; `None`: as far as the rig works.
+    /// Distance from the camera to the board along its axis, mm, before the board was touched; `None`: the rig's
+    /// working distance.
     pub distance_mm: Option<f64>,
-    /// Length of the sweep, mm; `None`: over the part.
+    /// Length of the sweep, mm; `None`: the part's.
     pub sweep_mm: Option<f64>,
-    /// From one shot to the next, mm; `None`: the job's.
+    /// Distance between shots, mm; `None`: the job's.
     pub step_mm: Option<f64>,
-    /// `None`: the fastest that camera, chain and station bear.
+    /// Speed, mm/s; `None`: the fastest that camera, chain and station allow.
     pub speed_mm_s: Option<f64>,
-    /// The camera's rate, where it is known.
+    /// The camera's rate, if known.
     pub camera_hz: Option<f64>,
-    /// The chain's, as it was measured.
+    /// The measured rate of the chain.
     pub chain_hz: Option<f64>,
 }
 
-/// A sweep that is looked at.
+/// A planned sweep.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Preview {
     /// Name of the recipe.
     pub recipe: String,
-    /// The board was touched; else it is taken to lie squarely before the camera.
+    /// The board was touched; otherwise it is assumed to lie squarely in front of the camera.
     pub touched: bool,
     /// The sweep.
     pub sweep: SweepFigures,
-    /// The flange at the first and the last shot; none where nobody knows where the robot stands.
+    /// The flange at the first and the last shot; `None` if the robot's pose is unknown.
     pub flange: Option<[Rigid<Base, Flange>; 2]>,
-    /// What is swept, and how far a part in its middle reaches, in the camera's picture as it stands now, px; empty:
-    /// not known.
+    /// Outline of the swept area, and of a part in its middle, in the camera's present picture, px; empty: unknown.
     pub seen_px: Vec<Vec<[f64; 2]>>,
-    /// What limits the pace.
+    /// The limits of the pace.
     pub can: Can,
-    /// None where nothing is known that limits it.
+    /// `None` if no limit is known.
     pub pace: Option<Pace>,
 }
 
-/// Plans it.
+/// Plans the sweep.
 ///
 /// # Errors
 /// Those of [`sweep`] and [`pace`].

@@ -1,5 +1,5 @@
-//! In: pictures and the poses at which they were taken. Out: a recording in the recording format, complete when it
-//! has its meta.json.
+//! In: pictures and the poses at which they were taken. Out: a recording in the recording format; it is complete
+//! when its meta.json exists.
 //! Frame and unit: base_from_flange, mm.
 
 use crate::arm::TimedPose;
@@ -10,7 +10,7 @@ use crate::raster::{Image, Response, save_png};
 use crate::recording::{AmbientRef, Beam, FrameRef, ImageSpec, Meta, Recording, save_poses};
 use std::path::{Path, PathBuf};
 
-/// A recording in the making.
+/// A recording that is being written.
 pub struct Record {
     folder: PathBuf,
     meta: Meta,
@@ -18,7 +18,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// Begins one; what stood there goes.
+    /// Begins a recording; a meta.json in the folder is removed.
     pub fn begin(folder: &Path, name: &str, beam: Beam, pictures: Pictures) -> Result<Record> {
         crate::files::make_folder(folder)?;
         let meta = folder.join("meta.json");
@@ -56,7 +56,7 @@ impl Record {
         Ok(Record { folder: folder.to_owned(), meta, poses: Vec::new() })
     }
 
-    /// A picture with the laser on.
+    /// Adds a picture with the laser on.
     pub fn shot(&mut self, picture: &Image, at: &TimedPose) -> Result<()> {
         let (k, name) = (self.poses.len(), format!("laser_{:04}.png", self.meta.frames.len()));
         save_png(picture, &self.folder.join(&name))?;
@@ -65,7 +65,7 @@ impl Record {
         Ok(())
     }
 
-    /// The one picture in room light.
+    /// Adds the one picture in room light.
     pub fn ambient(&mut self, picture: &Image, at: &TimedPose) -> Result<()> {
         save_png(picture, &self.folder.join("ambient.png"))?;
         self.meta.ambient = Some(AmbientRef { file: "ambient.png".into(), pose: Some(self.poses.len()) });
@@ -73,7 +73,7 @@ impl Record {
         Ok(())
     }
 
-    /// Completes it.
+    /// Completes the recording.
     pub fn end(self) -> Result<Recording> {
         save_poses(&self.folder.join("poses.json"), &self.poses)?;
         let text = serde_json::to_string_pretty(&self.meta).expect("plain data");

@@ -1,4 +1,4 @@
-//! In: a job that has ended. Out: what came of it, how long it took and what a person had to do.
+//! In: a job that has ended. Out: its outcome, its duration and the number of confirmations by a person.
 //! Frame and unit: s; mm, degrees.
 
 use super::state::{JobState, Phase, Resumes};
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Outcome {
-    /// The component was let go at the insertion pose, and the tool is back up.
+    /// The component was released at the insertion pose, and the tool is back up.
     Inserted,
     /// Nothing was inserted; the arm stands still.
     Stopped,
@@ -22,21 +22,21 @@ pub struct JobReport {
     pub outcome: Outcome,
     /// Why it was stopped; empty otherwise.
     pub why: String,
-    /// Where it came to.
+    /// The phase that it reached.
     pub phase: Phase,
-    /// How it goes on when it is taken up again.
+    /// How it continues when it is resumed.
     pub resumes: Resumes,
-    /// Work and waits, s.
+    /// Duration of work and waits, s.
     pub seconds: f64,
-    /// The same by step.
+    /// The same for each phase.
     pub seconds_by_phase: BTreeMap<Phase, f64>,
-    /// From the beginning to the confirmed insertion pose, s.
+    /// Time from the beginning to the end of the approach, s.
     pub time_to_position_s: Option<f64>,
-    /// Times a person was asked until then.
+    /// Number of confirmations by a person until then.
     pub confirmations_to_position: Option<u32>,
-    /// Times a person was asked in all.
+    /// Number of confirmations in all.
     pub confirmations: u32,
-    /// What was found of the part, where it was looked for.
+    /// The part that was found; `None` if it was not searched for.
     pub found: Option<Report>,
 }
 
@@ -57,7 +57,7 @@ impl JobReport {
         }
     }
 
-    /// What a person may do with a job that was stopped.
+    /// What a person may do with a stopped job.
     pub fn next(&self) -> &'static str {
         match self.resumes {
             Resumes::Over => "look at the cell, then begin a new job",

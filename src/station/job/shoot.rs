@@ -1,5 +1,4 @@
-//! In: an arm that has come to a stop, a camera, a beam. Out: a picture of the beam in a recording, with the pose at
-//! which it was taken.
+//! In: an arm that has stopped, a camera, a beam. Out: a picture of the beam in a recording, with its pose.
 //! Frame and unit: base_from_flange, mm; ms.
 
 use super::eye::Eye;
@@ -9,16 +8,17 @@ use crate::fault::{Fault, Result};
 use crate::recording::Beam;
 use std::time::Duration;
 
-/// The arm stands still so long before a picture is taken, ms.
+/// Waiting time of the standing arm before a picture is taken.
 const SETTLE: Duration = Duration::from_millis(5);
-/// Waits until an arm that has arrived stands still.
+/// Waits until an arm that has arrived has come to rest.
 pub fn settle() {
     std::thread::sleep(SETTLE);
 }
 
-/// A picture of a beam with the pose at which it was taken; the arm stood still before and after, or it is refused.
+/// Takes a picture of a beam and records it with its pose; refuses if the arm moved between a reading before and
+/// one after.
 pub fn shoot(eye: &mut Eye, arm: &mut dyn Arm, record: &mut Record, beam: Option<Beam>) -> Result<()> {
-    /// As far apart as two readings of an arm that stands may be, mm and rad.
+    /// Largest difference of two readings of an arm at rest, mm and rad.
     const STILL: [f64; 2] = [0.01, 1e-4];
     settle();
     let before = arm.pose()?;

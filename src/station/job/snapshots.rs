@@ -1,32 +1,33 @@
-//! Pictures of a running camera that were begun after they were asked for.
+//! Pictures of a running camera whose exposure began after they were requested.
 
 use crate::capture::{Event, PictureSource, Pictures};
 use crate::fault::{Fault, Result};
 use crate::raster::Image;
 use std::time::{Duration, Instant};
 
-/// A picture that has not come by then does not come.
+/// Longest wait for a picture.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Of a camera whose clock cannot be asked so many pictures are passed over: they may have been on their way.
+/// Number of pictures that are skipped if the camera's clock cannot be read: they may have been taken before the
+/// request.
 const ON_THEIR_WAY: u32 = 3;
 
-/// A camera of which single pictures are wanted.
+/// A camera that takes single pictures on request.
 pub struct Snapshots {
     camera: Box<dyn PictureSource>,
 }
 
 impl Snapshots {
-    /// Of this camera.
+    /// Takes pictures with this camera.
     pub fn new(camera: Box<dyn PictureSource>) -> Snapshots {
         Snapshots { camera }
     }
 
-    /// What its pictures are, and how they are read from the sensor.
+    /// Format of its pictures, and their readout from the sensor.
     pub fn pictures(&self) -> Pictures {
         Pictures { format: self.camera.format(), readout: self.camera.readout() }
     }
 
-    /// A picture that was begun after now, in whatever light there is.
+    /// A picture whose exposure began after this call, in the present light.
     pub fn fresh(&mut self) -> Result<Image> {
         let triggered = self.camera.trigger()?;
         let since = if triggered { None } else { self.camera.clock()?.map(|c| c.there_ns) };

@@ -1,4 +1,4 @@
-//! In: what a job has come to. Out: job.json, written before and after everything that changes the world.
+//! In: the progress of a job. Out: job.json, written before and after every motion or switching.
 //! Frame and unit: base frame, mm; times UTC.
 
 use crate::fault::{Fault, Result};
@@ -8,19 +8,19 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What is done next.
+/// The next step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Phase {
     /// The pointer touches the board in several places.
     Touch,
-    /// The sensor looks squarely, and the line sweeps over the part.
+    /// The camera views the board squarely, and the line sweeps over the part.
     Scan,
-    /// The part is looked for in the scan.
+    /// The part is searched for in the scan.
     Find,
     /// The tool goes above the part.
     Approach,
-    /// The component goes in, and the gripper lets it go.
+    /// The component is inserted, and the gripper releases it.
     Insert,
     /// The tool goes back up.
     Retract,
@@ -31,17 +31,17 @@ pub enum Phase {
     BackedOut,
 }
 
-/// How a job goes on when it is taken up again.
+/// How a job continues when it is resumed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Resumes {
-    /// With the phase that is next.
+    /// With the next phase.
     On,
-    /// It measures anew, from where the arm stands.
+    /// It measures again, from the arm's present pose.
     Anew,
-    /// Down at the part there is only one way that is known to be free: back up.
+    /// At the part only the path back up is known to be free.
     Up,
-    /// Not at all.
+    /// It cannot be resumed.
     Over,
 }
 
@@ -49,56 +49,56 @@ pub enum Resumes {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JobState {
-    /// Version of this file: 2. In 1 there was no `stopped`: a job that was stopped had forgotten its phase.
+    /// Version of this file: 2. Version 1 had no `stopped`: a stopped job had lost its phase.
     pub format: u32,
-    /// Of the recipe's text and the station's calibrations: its poses are good with these only.
+    /// Hash of the recipe's text and the station's calibrations: the poses are valid only with these.
     #[serde(default)]
     pub made_from: String,
-    /// What is done next, or what it was stopped in.
+    /// The next phase, or the one in which the job was stopped.
     pub phase: Phase,
-    /// It was stopped: by a person, a gate or a fault; `why` says it.
+    /// It was stopped by a person, a gate or a fault; `why` has the reason.
     pub stopped: bool,
-    /// A motion was begun and its end was not written down: nobody knows where the arm is.
+    /// A motion was begun and its end was not recorded: the arm's pose is unknown.
     pub moving: bool,
-    /// Where the arm stood when the job was begun.
+    /// Flange pose at the job's beginning.
     pub start: Rigid<Base, Flange>,
-    /// Of the touched board: a point and the unit normal away from it.
+    /// A point of the touched board and its unit normal, pointing away from it.
     pub surface: Option<[Vec3; 2]>,
-    /// So often the step of its sweep was halved, because a pose was not known well enough.
+    /// How often the step of the sweep was halved because a pose was too uncertain.
     #[serde(default)]
     pub halvings: u32,
-    /// So far its sweep was moved each time that the part went on beyond the rim of the scan; base frame, mm.
+    /// The shifts of the sweep, one for each time that the part extended beyond the scan's edge; base frame, mm.
     #[serde(default)]
     pub moved_mm: Vec<Vec3>,
-    /// When the scan was finished, s since 1970.
+    /// Time of the end of the scan, s since 1970.
     pub scanned_at: Option<f64>,
-    /// Flange at approach, insertion and retract.
+    /// Flange poses of approach, insertion and retract.
     pub poses: Option<[Rigid<Base, Flange>; 3]>,
-    /// The gripper has let the component go.
+    /// The gripper has released the component.
     pub released: bool,
-    /// Times that a person was asked and said yes.
+    /// Number of confirmations by a person.
     pub confirmations: u32,
-    /// Seconds of work so far, the waits for a person included.
+    /// Seconds of work so far, including waits for a person.
     pub seconds: f64,
-    /// The same by phase.
+    /// The same for each phase.
     #[serde(default)]
     pub seconds_by_phase: BTreeMap<Phase, f64>,
-    /// The same until the insertion pose was confirmed.
+    /// The same until the approach motion had ended.
     pub seconds_to_position: Option<f64>,
-    /// Confirmations until then.
+    /// Number of confirmations until then.
     pub confirmations_to_position: Option<u32>,
-    /// Why it was stopped; empty while it was not.
+    /// Reason of the stop; empty if it was not stopped.
     pub why: String,
 }
 
 const NAME: &str = "job.json";
 const FORMAT: u32 = 2;
-/// Why a job ended that came back up with its component.
+/// The reason of a job that came back up with its component.
 pub(super) const BACKED_OUT: &str = "backed out: nothing was inserted";
 const ANEW: &str = "look at the robot, then begin a new job in another folder";
 
 impl JobState {
-    /// A job that begins where the arm stands.
+    /// A job that begins at the arm's present pose.
     pub fn new(start: Rigid<Base, Flange>) -> JobState {
         JobState {
             format: FORMAT,
@@ -122,10 +122,10 @@ impl JobState {
         }
     }
 
-    /// The job in a folder; `None` where none was begun there.
+    /// The job in a folder; `None` if the folder holds none.
     ///
     /// # Errors
-    /// A job.json that cannot be read, or that is not as it was written: the arm is moved by what it says.
+    /// A job.json that cannot be read or was changed: the arm is moved by its content.
     pub fn load(folder: &Path) -> Result<Option<JobState>> {
         let path = folder.join(NAME);
         let Some(text) = crate::files::read_text_if_there(&path)? else { return Ok(None) };
@@ -150,30 +150,31 @@ impl JobState {
         Ok(Some(state))
     }
 
-    /// How it goes on when it is taken up again.
+    /// How the job continues when it is resumed.
     pub fn resumes(&self) -> Resumes {
         let interrupted = self.stopped || self.moving;
         match self.phase {
             Phase::Done | Phase::BackedOut => Resumes::Over,
             Phase::Retract => Resumes::Up,
             Phase::Insert if interrupted => Resumes::Up,
-            // Stopped before it went there, it stands where the scan ended.
+            // If it was stopped before that motion, the arm stands where the scan ended.
             Phase::Approach if self.moving => Resumes::Up,
             _ if interrupted => Resumes::Anew,
             _ => Resumes::On,
         }
     }
 
-    /// Forgets what was measured.
+    /// Discards what was measured.
     pub(super) fn measure_anew(&mut self) {
         (self.phase, self.surface, self.poses, self.scanned_at) = (Phase::Touch, None, None, None);
         (self.halvings, self.moved_mm) = (0, vec![]);
     }
 
-    /// Goes on only with the recipe and the calibrations that its poses were made from; back up it may go with any.
+    /// Accepts only the recipe and the calibrations from which its poses were made; the way back up is allowed with
+    /// any.
     ///
     /// # Errors
-    /// Another recipe or other calibrations.
+    /// The job was begun with another recipe or other calibrations.
     pub fn goes_on_with(&self, made_from: &str) -> Result<()> {
         let way_up = matches!(self.resumes(), Resumes::Up | Resumes::Over);
         if way_up || self.made_from == made_from {
@@ -189,15 +190,14 @@ impl JobState {
         .next("put them back, or begin a new job in another folder"))
     }
 
-    /// Writes it down.
+    /// Writes job.json.
     pub fn store(&self, folder: &Path) -> Result<()> {
         crate::files::write(&folder.join(NAME), sealed(self).as_bytes())
     }
 }
 
-/// Makes a file of format 1 one of today. A job that was stopped there had forgotten its phase: poses at the part are
-/// known from the
-/// approach on.
+/// Converts a file of format 1 to the present format. A stopped job had lost its phase there; its poses at the part
+/// are known from the approach on.
 fn former(value: &mut Value) {
     let was_stopped = value["phase"] == "stopped";
     if was_stopped {

@@ -1,7 +1,7 @@
-//! In: a station, a recipe, from where the board was seen. Out: how the line goes over the part before anything is
-//! scanned: a pose a shot, and what is left beside part, picture, working volume and box. The job moves by it; page
-//! and command line show the same.
-//! Frame and unit: base frame; the board as the camera sees it squarely, from the foot of its axis (x right, y down);
+//! In: a station, a recipe, the pose from which the board was seen. Out: the path of the line over the part before
+//! anything is scanned: one pose per shot, and the margins to part, picture, working volume and box. The job moves
+//! along it; page and command line show the same.
+//! Frame and unit: base frame; the board in the camera's square view, from the foot of its axis (x right, y down);
 //! mm.
 
 use super::places;
@@ -14,30 +14,30 @@ use crate::rig::{Rig, Volume};
 use crate::station::settings::Settings;
 use crate::station::volume;
 
-/// A known part lies so near to the picture's middle, as a share of the field's short side.
+/// Largest distance of a known part from the picture's middle, as a share of the field's short side.
 pub(super) const ASIDE: f64 = 1.0 / 8.0;
-/// Steps a cell of the recipe's map: about two.
+/// Step as a share of the cell of the recipe's map: about two shots a cell.
 const STEP: f64 = 0.6;
-/// Pieces of a side that is drawn.
+/// Number of pieces in which a side is drawn.
 const PIECES: usize = 8;
-/// A sweep that somebody states, mm.
+/// Allowed length of a stated sweep, mm.
 const STATED: std::ops::RangeInclusive<f64> = 5.0..=1000.0;
 
-/// From where the board was seen, and where it is.
+/// The board, and the pose from which it was seen.
 #[derive(Clone, Debug)]
 pub struct Board {
-    /// Where the flange stood.
+    /// Pose of the flange.
     pub start: Rigid<Base, Flange>,
-    /// A point of it, and its unit normal towards the camera.
+    /// A point of the board, and its unit normal towards the camera.
     pub surface: [Vec3; 2],
 }
 
 impl Board {
-    /// Before anything was touched: squarely before the camera, as far from it as the rig works, or as is stated.
-    /// Without a robot's pose the camera's own frame stands for the base.
+    /// The assumed board before anything was touched: squarely in front of the camera, at the rig's working
+    /// distance or at the stated one. Without a robot pose the camera's own frame replaces the base.
     ///
     /// # Errors
-    /// A rig without hand-eye; a distance that is none; nobody knows how far the rig looks.
+    /// A rig without hand-eye; a distance that is not positive and finite; an unknown working distance.
     pub fn presumed(
         settings: &Settings,
         rig: &Rig,
@@ -60,47 +60,48 @@ impl Board {
     }
 }
 
-/// How the line goes over a part.
+/// The sweep of the line over a part.
 #[derive(Clone, Debug)]
 pub struct Sweep {
-    /// From here the camera looks at the board squarely.
+    /// Flange pose of the square view of the board.
     pub square: Rigid<Base, Flange>,
-    /// One a shot.
+    /// One flange pose per shot.
     pub flanges: Vec<Rigid<Base, Flange>>,
-    /// What people want to know of it.
+    /// The sweep's figures for display.
     pub figures: SweepFigures,
 }
 
-/// A sweep in numbers.
+/// The figures of a sweep.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct SweepFigures {
-    /// From the board to the camera, mm.
+    /// Distance from the board to the camera, mm.
     pub depth_mm: f64,
-    /// From the first shot's stripe to the last one's, mm.
+    /// Distance from the first shot's stripe to the last one's, mm.
     pub length_mm: f64,
-    /// From one shot to the next, mm.
+    /// Distance between shots, mm.
     pub step_mm: f64,
-    /// Pictures.
+    /// Number of pictures.
     pub shots: usize,
-    /// Across the part however it is turned: its drawing's diagonal, mm.
+    /// The diagonal of the part's drawing, mm: its extent however it is turned.
     pub part_mm: f64,
-    /// What the camera sees of the board from its square pose: x0 y0 x1 y1, mm.
+    /// Area of the board in the square view: x0 y0 x1 y1, mm.
     pub field_mm: [f64; 4],
-    /// The ends of the first shot's stripe, then those of the last one's, in the order around what is swept, mm.
+    /// The ends of the first shot's stripe, then those of the last one's, in order around the swept area, mm.
     pub swept_mm: [[f64; 2]; 4],
-    /// How far the part may lie off the picture's middle along the sweep and be swept whole, mm; negative: never.
+    /// How far the part may be off the picture's middle along the sweep and still be swept completely, mm;
+    /// negative: never.
     pub along_mm: f64,
-    /// The same along the stripe, whose ends are the picture's.
+    /// The same along the stripe, whose ends are at the picture's edges.
     pub across_mm: f64,
-    /// How far something may stand above the board, and lie below it, within the working volume, mm; none: nobody
-    /// knows it.
+    /// How far the working volume extends above the board and below it, mm; `None`: unknown.
     pub volume_mm: Option<[f64; 2]>,
-    /// How far the flange stays inside the box of `[motion]`, mm; negative: outside; none: no box is stated.
+    /// Smallest distance of the flange to the sides of the box of `[motion]`, mm; negative: outside; `None`: no box
+    /// is stated.
     pub box_mm: Option<f64>,
 }
 
 impl SweepFigures {
-    /// A sentence a line.
+    /// The figures as sentences, one a line.
     pub fn says(&self) -> Vec<String> {
         let mut says = vec![format!(
             "the camera {:.0} mm above the board, then {} shots over {:.0} mm",
@@ -118,8 +119,9 @@ impl SweepFigures {
 }
 
 impl Sweep {
-    /// What is swept and how far a part in its middle reaches, as the camera on the flange sees them, px; closed
-    /// lines, an integer pixel is a pixel's centre. `None`: some of it lies where the lens shows nothing.
+    /// Outlines of the swept area and of a part in its middle in the picture of the camera on the flange, px. The
+    /// lines are closed; integer coordinates are pixel centres. `None`: some of it lies where the lens shows
+    /// nothing.
     pub fn seen(&self, rig: &Rig, flange: &Rigid<Base, Flange>) -> Option<[Vec<[f64; 2]>; 2]> {
         let (camera, hand_eye) = (rig.camera.as_ref()?.value, rig.hand_eye.as_ref()?.value);
         let from_square = (*flange * hand_eye).inverse() * (self.square * hand_eye);
@@ -127,7 +129,7 @@ impl Sweep {
             let px = camera.pixel_from_point(&from_square.point(&Vec3::new(x, y, self.figures.depth_mm)))?;
             Some([px.x, px.y])
         };
-        // Lenses bend what is straight: each side in pieces.
+        // Lenses bend straight lines: each side is drawn in pieces.
         let corners = &self.figures.swept_mm;
         let side = |k: usize, i: usize| {
             let (a, b, u) = (corners[k], corners[(k + 1) % 4], i as f64 / PIECES as f64);
@@ -142,11 +144,11 @@ impl Sweep {
     }
 }
 
-/// The sweep over a part that lies about the foot of the camera's axis. `halvings`: so often its step is halved, 0 to
-/// 3; it is finer than what a pixel sees then, and averages what the arm scatters by.
+/// The sweep over a part near the foot of the camera's axis. `halvings`: how often its step is halved, 0 to 3. A
+/// step below a pixel's footprint averages the arm's scatter.
 ///
 /// # Errors
-/// A calibration is missing; a length out of range; a line that lies beside the picture at that distance.
+/// A calibration is missing, a length is out of range, or the line lies outside the picture at that distance.
 pub fn sweep(
     settings: &Settings,
     rig: &Rig,
@@ -161,11 +163,11 @@ pub fn sweep(
     let square = squarely(board, &hand_eye, depth);
     let field = field(&camera, depth);
     let short = (field[2] - field[0]).min(field[3] - field[1]);
-    // However it is turned, and as far beside the picture's middle as an operator leaves it.
+    // Covers the part in any orientation, as far off the picture's middle as an operator leaves it.
     let [x0, y0, x1, y1] = recipe.drawing().bounds();
     let part = (x1 - x0).hypot(y1 - y0);
     let length = stated.map_or(Ok((part + 2.0 * ASIDE * short).min(short)), checked)?;
-    // No finer than what a pixel sees.
+    // No finer than a pixel's footprint.
     let step = (STEP * recipe.cell_mm).max(depth / camera.fx) * 0.5f64.powi(halvings.min(3) as i32);
     let flanges = places::sweep(&square, &hand_eye, &plane, depth, length, step);
     let [low, high] = stripe(&plane, depth, &field)?;
@@ -189,10 +191,10 @@ pub fn sweep(
     Ok(Sweep { square, flanges, figures })
 }
 
-/// Refuses a length that no sweep has.
+/// Refuses a length outside [`STATED`].
 ///
 /// # Errors
-/// 5 to 1000 mm are wanted.
+/// The length is not 5 to 1000 mm.
 pub(super) fn checked(mm: f64) -> Result<f64> {
     if STATED.contains(&mm) {
         return Ok(mm);
@@ -201,7 +203,7 @@ pub(super) fn checked(mm: f64) -> Result<f64> {
         .next("correct the option"))
 }
 
-/// The flange pose from which the camera looks along the normal at the board, turned as it was.
+/// The flange pose from which the camera views the board along its normal; the turn about the normal is retained.
 fn squarely(board: &Board, hand_eye: &Rigid<Flange, Camera>, depth: f64) -> Rigid<Base, Flange> {
     let [centre, normal] = board.surface;
     let start = board.start * *hand_eye;
@@ -209,14 +211,14 @@ fn squarely(board: &Board, hand_eye: &Rigid<Flange, Camera>, depth: f64) -> Rigi
     let x = (x - normal * x.dot(&normal)).normalize();
     let z = -normal;
     let rotation = Mat3::from_columns(&[x, z.cross(&x), z]);
-    // The foot of the axis stays where the operator has put it, on the plane of the board.
+    // The axis still meets the board where the operator aimed it.
     let axis = start.rotation.column(2).into_owned();
     let foot = start.translation + axis * ((centre - start.translation).dot(&normal) / axis.dot(&normal));
     let camera: Rigid<Base, Camera> = Rigid::new(rotation, foot + normal * depth);
     camera * hand_eye.inverse()
 }
 
-/// What the picture's edges see of the board; the lens left out.
+/// The area of the board that the picture's edges enclose, without lens distortion.
 fn field(camera: &Intrinsics, depth: f64) -> [f64; 4] {
     let at = |px: f64, middle: f64, focal: f64| (px - middle) / focal * depth;
     // Edges, not centres, of the first and the last pixel.
@@ -229,7 +231,7 @@ fn field(camera: &Intrinsics, depth: f64) -> [f64; 4] {
     ]
 }
 
-/// From where to where along itself the line is seen on the board, from the point that is nearest to the axis' foot.
+/// Start and end of the line on the board, along itself, from its point nearest to the foot of the axis.
 fn stripe(plane: &Plane<Camera>, depth: f64, field: &[f64; 4]) -> Result<[f64; 2]> {
     let n = Vec2::new(plane.normal.x, plane.normal.y);
     let (from, along) = (n * ((plane.offset - plane.normal.z * depth) / n.norm_squared()), n.normalize());
@@ -256,12 +258,12 @@ fn stripe(plane: &Plane<Camera>, depth: f64, field: &[f64; 4]) -> Result<[f64; 2
     .next("state [working_volume] in station.toml where the line is seen, or calibrate the laser plane"))
 }
 
-/// What of the working volume is left before the board and behind it.
+/// How far the working volume extends in front of the board and behind it.
 fn beside(v: &Volume, depth: f64) -> [f64; 2] {
     [depth - v.near_mm, v.far_mm - depth]
 }
 
-/// The nearest that any of them comes to a side of the box, from inside.
+/// Smallest distance of the poses to a side of the box, positive inside.
 fn inside<'a>(space: &Space, poses: impl Iterator<Item = &'a Rigid<Base, Flange>>) -> f64 {
     let side = |p: &Vec3| (0..3).map(|k| (p[k] - space.from_mm[k]).min(space.to_mm[k] - p[k])).fold(f64::MAX, f64::min);
     poses.map(|p| side(&p.translation)).fold(f64::MAX, f64::min)
@@ -282,7 +284,7 @@ mod tests {
         let s = sweep(&settings, &rig, &recipe, Some(60.0), 0, &board).unwrap();
         let f = &s.figures;
         assert_eq!((f.shots, f.length_mm), (s.flanges.len(), 60.0));
-        // The sheet, carried along, meets the board where the corners say, and there the camera sees it at its
+        // The sheet, moved along, meets the board at the stated corners, and there the camera sees it at its
         // picture's edge.
         let (hand_eye, plane) = (rig.hand_eye.as_ref().unwrap().value, rig.laser_plane.as_ref().unwrap().value);
         let camera = rig.camera.as_ref().unwrap().value;
@@ -307,13 +309,13 @@ mod tests {
         }
         assert!((f.along_mm - (30.0 - f.part_mm / 2.0)).abs() < 1e-12 && f.across_mm > 0.0, "{f:?}");
         assert!(sweep(&settings, &rig, &recipe, Some(4.0), 0, &board).is_err());
-        // From the square pose itself the first and last stripe end at the picture's edges, but for what the lens
-        // bends.
+        // From the square pose itself the first and last stripe end at the picture's edges, except for lens
+        // distortion.
         let [swept, round] = s.seen(&rig, &s.square).unwrap();
         assert!(swept.len() == 33 && swept[0] == swept[32] && round[0][0] - round[16][0] > 100.0, "{swept:?}");
         let wide = camera.fx * f.part_mm / depth;
         assert!(((round[0][0] - round[16][0]) / wide - 1.0).abs() < 0.05, "{round:?}");
-        // The box ends 7 mm beside the last shot.
+        // The box ends 7 mm beyond the last shot.
         let last = s.flanges.last().unwrap().translation;
         let far = Vec3::repeat(1e4);
         let space = |to: Vec3| Space { from_mm: (-far).into(), to_mm: to.into() };

@@ -1,5 +1,5 @@
-//! In: a job's arm, camera and pointer. Out: the board's plane, from touches around the picture's middle; where they
-//! meet several surfaces, from touches around those of them that lie on one.
+//! In: a job's arm, camera and pointer. Out: the board's plane, from touches around the picture's middle; if these
+//! meet several surfaces, from further touches around those that lie on one.
 //! Frame and unit: base frame; mm, degrees.
 
 use super::machine::Job;
@@ -14,26 +14,27 @@ use crate::recording::{Beam, Recording};
 use crate::station::range::{RangeReport, RangeRun, measure_range};
 use crate::station::volume;
 
-/// Touches of one board lie about its plane by less than this share of the view's distance: a board's thickness is
-/// more.
+/// Touches of one board scatter about its plane by less than this share of the view's distance; a board's thickness
+/// is more.
 const ONE_PLANE: f64 = 0.002;
-/// A touched board whose points scatter more than this about their plane, as a share of the view's distance, is none.
+/// Largest scatter of the points about their plane, as a share of the view's distance; beyond it they are not one
+/// board.
 const FLAT: f64 = 0.01;
-/// Touches around those that met one surface lie within this share of the first ones' spread.
+/// Spread of the repeated touches, as a share of the first ones' spread.
 const AGAIN: f64 = 0.5;
 
-/// Where touches are to lie.
+/// Where touches are placed.
 struct Around {
-    /// In the frame of the camera as it stood first, mm.
+    /// In the camera's frame at its first pose, mm.
     middle: Vec3,
-    /// Share of the first touches' spread.
+    /// Spread of the touches as a share of the first ones' spread.
     spread: f64,
-    /// Folder of the pictures, and what it is called.
+    /// Name of the plan and of the folder of the pictures.
     name: &'static str,
 }
 
 impl Job<'_> {
-    /// The pointer on the board: once from where the arm stands, then from places around it.
+    /// Touches the board with the pointer: once from the arm's pose, then at positions around it.
     pub(super) fn touch(&mut self) -> Result<Phase> {
         let (first, at) = self.first_touch()?;
         let base_from_camera = at * self.rig.need_hand_eye()?.value;
@@ -42,8 +43,8 @@ impl Job<'_> {
         let touches = self.touch_around(&base_from_camera, &around, then)?;
         let (points, on) = self.on_one_plane(&touches, then)?;
         let touched = match on.len() {
-            // The board ends in the picture, or parts stand on it: those that met one surface say where to look for
-            // more.
+            // The board ends in the picture, or parts stand on it: touches that met one surface indicate where to
+            // touch again.
             0 => {
                 let camera: Vec<Vec3> = points.iter().map(|p| base_from_camera.inverse().point(&p.1)).collect();
                 let middle = places::most_on_one_plane(&camera, ONE_PLANE * then);
@@ -77,7 +78,7 @@ impl Job<'_> {
         Ok(Phase::Scan)
     }
 
-    /// Goes to places around a middle and takes a picture of the pointer's spot at each.
+    /// Goes to positions around a middle and takes a picture of the pointer's spot at each.
     fn touch_around(
         &mut self,
         base_from_camera: &Rigid<Base, Camera>,
@@ -104,19 +105,19 @@ impl Job<'_> {
         record.end()
     }
 
-    /// The touched points by their pictures, and those of them that lie on one plane; none where that is not more
-    /// than half.
+    /// The touched points by their pictures, and the indices of those that lie on one plane; empty if that is not
+    /// more than half.
     fn on_one_plane(&self, touches: &Recording, distance: f64) -> Result<(Vec<(String, Vec3)>, Vec<usize>)> {
         let all = measure_range(touches, &self.rig, &RangeRun::default())?;
         let points: Vec<(String, Vec3)> =
             all.distances.into_iter().filter_map(|d| Some((d.picture, Vec3::from(d.point_base_mm?)))).collect();
         let at: Vec<Vec3> = points.iter().map(|p| p.1).collect();
         let on = places::on_one_plane(&at, ONE_PLANE * distance);
-        // Three lie on one plane always.
+        // Three always lie on one plane.
         Ok((points, if on.len() < 4 { Vec::new() } else { on }))
     }
 
-    /// The plane of the touches that lie on one: others met a part, or what lies beside the board.
+    /// The plane of the touches that lie on one; the others met a part, or something beside the board.
     fn board(&self, mut touches: Recording, distance: f64) -> Result<RangeReport> {
         let (points, on) = self.on_one_plane(&touches, distance)?;
         if on.is_empty() {
@@ -133,7 +134,7 @@ impl Job<'_> {
         measure_range(&touches, &self.rig, &RangeRun { one_surface: true, ..RangeRun::default() })
     }
 
-    /// How far the board is, and where the flange stood; nothing moves.
+    /// Measures the distance of the board and the flange pose; nothing moves.
     fn first_touch(&mut self) -> Result<(f64, Rigid<Base, Flange>)> {
         let mut record =
             Record::begin(&self.options.out.join("first"), "first touch", Beam::Pointer, self.eye.pictures())?;
@@ -141,7 +142,8 @@ impl Job<'_> {
         let shot = shoot(&mut self.eye, link, &mut record, Some(Beam::Pointer));
         self.eye.lights.after(shot)?;
         let at = link.pose()?.base_from_flange;
-        // The place is the operator's, an edge may be there: those around it are on the board, and count in full.
+        // The operator chose this position, and an edge may be there. The touches around it are on the board and
+        // count fully.
         let seen = measure_range(&record.end()?, &self.rig, &RangeRun { coarse: true, ..RangeRun::default() });
         let missing = |what: String| {
             Fault::refused(format!("the pointer's spot is not in the first picture: {what}"))

@@ -1,4 +1,4 @@
-//! In: pictures, bytes, counts. Out: what a page carries inside instead of loading it.
+//! In: pictures, bytes, counts. Out: content embedded in a page instead of loaded by it.
 //! Frame and unit: none.
 
 use crate::fault::Result;
@@ -6,15 +6,15 @@ use base64::prelude::{BASE64_STANDARD, Engine};
 use maud::{Markup, html};
 use std::path::Path;
 
-/// Bytes of a picture on the page.
+/// Most bytes of a picture on the page.
 const MOST_PICTURE: u64 = 256 << 20;
 
-/// Bytes as text that a page or a JSON file carries.
+/// Bytes as base64 text, for a page or a JSON file.
 pub fn base64(bytes: &[u8]) -> String {
     BASE64_STANDARD.encode(bytes)
 }
 
-/// A picture as part of the page.
+/// A picture embedded in the page.
 pub(super) fn picture(folder: &Path, name: &str, caption: &str) -> Result<Markup> {
     let bytes = crate::files::read(&folder.join(name), MOST_PICTURE)?;
     Ok(html! {

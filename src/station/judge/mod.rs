@@ -1,5 +1,4 @@
-//! In: a finished scan, the truth of the simulated station where there is one. Out: its errors, and the page that
-//! shows it.
+//! In: a finished scan, and the truth if the station was simulated. Out: its errors, and the page that shows them.
 //! Frame and unit: base frame, mm.
 
 pub(super) mod embed;

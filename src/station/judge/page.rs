@@ -1,5 +1,5 @@
-//! In: a finished scan folder, and its errors where the truth is known. Out: index.html, one page that
-//! carries its pictures and points inside and loads nothing from anywhere.
+//! In: a finished scan folder, and its errors if the truth is known. Out: index.html, one page with embedded
+//! pictures and points that loads nothing else.
 //! Frame and unit: base frame, mm; pixels.
 
 use super::embed::{picture, thousands};

@@ -1,5 +1,4 @@
-//! In: a finished scan of a simulated station, recipes, the truth. Out: each part's insertion pose and how
-//! far it is from the true one.
+//! In: a finished scan of a simulated station, recipes, the truth. Out: each part's insertion pose and its error.
 //! Frame and unit: errors in the part's own axes; mm, degrees.
 
 use crate::fault::Result;
@@ -8,29 +7,29 @@ use crate::simulate::Truth;
 use crate::station::find::find_part;
 use std::path::Path;
 
-/// A part that was looked for.
+/// A part that was searched for.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct FoundPart {
     /// Name of the recipe.
     pub name: String,
-    /// Title of the recipe, for people.
+    /// Title of the recipe, for display.
     pub title: String,
-    /// Every gate of the recipe kept: a pose left.
+    /// Every gate of the recipe was met, so that there is a pose.
     pub passed: bool,
-    /// Why not.
+    /// Reasons if a gate was not met.
     pub reasons: Vec<String>,
-    /// Found less true, along the part's x, y, z; none where there is no truth or no pose.
+    /// Found minus true position, along the part's x, y, z; `None` without truth or pose.
     pub error_mm: Option<[f64; 3]>,
-    /// Angle between found and true.
+    /// Angle between found and true pose, degrees.
     pub error_deg: Option<f64>,
-    /// What the report itself states, 1 sigma.
+    /// Sigmas that the report states, 1 sigma.
     pub sigma_mm: [f64; 3],
     /// The picture with the match drawn on the height map, beside the scan's other files.
     pub picture: String,
 }
 
-/// Finds the parts of `recipes` in a scan, writes `find_NAME.json` and `.png` beside it, and compares the
-/// poses with the truth. A part that is not found is a result, not an error.
+/// Finds the parts of `recipes` in a scan, writes `find_NAME.json` and `.png` beside it, and compares the poses
+/// with the truth. A part that is not found is a result, not an error.
 pub fn judge_parts(scan: &Path, station: &Path, truth: &Path, recipes: &[Recipe]) -> Result<Vec<FoundPart>> {
     let truth = Truth::load(truth)?;
     let mut out = Vec::new();

@@ -1,5 +1,5 @@
-//! In: a finished scan and the truth of the simulated station it was taken with. Out: its errors, in
-//! all and by part, a histogram and a map of them.
+//! In: a finished scan and the truth of its simulated station. Out: its errors, for all points and by part, a
+//! histogram and a map of them.
 //! Frame and unit: base frame, mm.
 
 use super::figures::{HISTOGRAM_STEP, Judged};
@@ -12,8 +12,8 @@ use std::path::Path;
 
 const HISTOGRAM_BINS: usize = 21;
 
-/// Compares a scan folder with `truth.json` and writes `errors.json`, `error_picture.png` and a new
-/// page, which shows the `found` parts too, into it.
+/// Compares a scan folder with `truth.json`. Writes `errors.json`, `error_picture.png` and a new page into it; the
+/// page also shows the `found` parts.
 pub fn judge(scan: &Path, truth: &Path, found: &[FoundPart]) -> Result<Judged> {
     let truth = Truth::load(truth)?;
     let cloud = CloudFile::open(&scan.join("cloud.ply"))?;
@@ -54,7 +54,7 @@ pub fn judge(scan: &Path, truth: &Path, found: &[FoundPart]) -> Result<Judged> {
     Ok(judged)
 }
 
-/// Puts each cell's distance from the true surface in the place of its sigma; returns their median.
+/// Replaces each cell's sigma with its distance from the true surface; returns the median distance.
 fn error_map(map: &mut HeightMap, truth: &Truth) -> f64 {
     let mut all = Vec::new();
     for iy in 0..map.height {

@@ -1,4 +1,4 @@
-//! In: a scan's points and its height map. Out: the part of its page that shows them, turned with the mouse.
+//! In: a scan's points and its height map. Out: the interactive 3-D view of its page, turned with the mouse.
 //! Frame and unit: the map's frame about its middle, mm.
 
 use super::embed::{base64, thousands};
@@ -8,9 +8,9 @@ use crate::scan::{CloudFile, HeightMap, PointSource};
 use maud::{Markup, PreEscaped, html};
 use std::path::Path;
 
-/// Points in the 3-D view; every k-th of the cloud.
+/// Most points in the 3-D view; every k-th point of the cloud is taken.
 const VIEW_POINTS: u64 = 120_000;
-/// A coordinate's step, mm: 16 bits of them reach 655 mm to each side.
+/// Resolution of a coordinate, mm: 16 bits reach 655 mm to each side.
 const STEP: f64 = 0.02;
 const VIEWER: &str = include_str!("viewer.js");
 

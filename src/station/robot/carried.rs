@@ -1,4 +1,4 @@
-//! What a station says of the things that its robot's flange carries; flange frame, mm.
+//! What the flange of a station's robot carries, from the station's files; flange frame, mm.
 
 use crate::arm::rules::Carried;
 use crate::fault::Result;
@@ -6,9 +6,9 @@ use crate::geometry::{Camera, Ray, Vec3};
 use crate::rig::Rig;
 use crate::station::settings::Settings;
 
-/// Tool and sensor head as station.toml states them. Where it states no head, the calibration says where the camera
-/// is, and where the pointer's beam leaves the camera's plane. A rig that cannot be read describes nothing, and the
-/// reason is shown with every motion.
+/// Tool and sensor head as station.toml states them. If it states no head, two points come from the calibration:
+/// the camera's centre, and the point where the pointer's beam crosses the plane through it. A rig that cannot be
+/// read describes nothing, and the reason is shown with every motion.
 pub fn carried(settings: &Settings, rig: &Result<Rig>) -> Carried {
     let tool = settings.tool.map(|t| t.flange_from_tool.translation);
     let stated = settings.head.as_ref().map(|h| h.points_mm.iter().map(|p| Vec3::from(*p)).collect());
@@ -28,7 +28,8 @@ fn measured(rig: &Rig) -> std::result::Result<Vec<Vec3>, String> {
     Ok(seen.map(|p| hand_eye.value.point(&p)).collect())
 }
 
-/// Where a beam crosses the plane through the camera's centre across its axis: its source stands about there.
+/// The point where a beam crosses the plane through the camera's centre normal to its axis: about the beam's
+/// source.
 fn leaves(beam: &Ray<Camera>) -> Option<Vec3> {
     let p = beam.at(-beam.origin.z / beam.direction.z);
     p.iter().all(|x| x.is_finite()).then_some(p)
@@ -51,7 +52,7 @@ mod tests {
         let (known, n) = (carried(&settings, &rig(None)), station.flange_from_camera.translation.norm());
         assert_eq!((known.points().count(), known.unknown().len()), (3, 1), "no tool: {:?}", known.unknown());
         assert!(lever(&settings, &rig(None)) >= n);
-        // The beam's source: on the beam, in the camera's plane.
+        // The beam's source lies on the beam, in the camera's plane.
         let source = station.flange_from_camera.inverse().point(known.points().last().unwrap());
         let beam = station.pointer.ray();
         assert!(source.z.abs() < 1e-9 && (source - beam.origin).cross(&beam.direction).norm() < 1e-6);

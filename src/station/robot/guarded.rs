@@ -1,5 +1,5 @@
-//! A station's robot behind its motion rules: limits, tool and sensor head come from the station's folder, and no
-//! caller leaves them out.
+//! A station's robot behind its motion rules. Limits, tool and sensor head come from the station's folder, so that
+//! no caller can omit them.
 
 use super::carried::carried;
 use crate::arm::rules::{Guard, MotionLog};
@@ -8,7 +8,8 @@ use crate::rig::Rig;
 use crate::station::settings::Settings;
 use std::path::Path;
 
-/// Opens the robot of a URI, read-only until it is armed. The station's motions.jsonl has what is asked of it and made.
+/// Opens the robot of a URI, read-only until it is armed. The station's motions.jsonl logs all requests and
+/// motions.
 ///
 /// # Errors
 /// station.toml cannot be read, or no controller answers.

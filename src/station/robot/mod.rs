@@ -1,4 +1,4 @@
-//! A station's robot, opened with everything that its motion rules have to know.
+//! A station's robot, opened with all inputs of its motion rules.
 
 mod carried;
 mod guarded;

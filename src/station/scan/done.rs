@@ -1,4 +1,4 @@
-//! Makes a finished scan's report, wherever its points are kept. Lengths are mm.
+//! Makes a finished scan's report, whether its points are in memory or on disk. Lengths are mm.
 
 use super::options::ScanOptions;
 use super::progress::Checkpoint;
@@ -11,7 +11,7 @@ use crate::rig::{Rig, Volume};
 use crate::scan::{Carrier, Pictures, Processor, Scanner, Source};
 use std::collections::BTreeMap;
 
-/// What the last shot of a scan leaves.
+/// Data of a scan after its last shot.
 pub(super) struct Done<'a> {
     pub label: &'a str,
     pub rig: &'a Rig,
@@ -21,19 +21,19 @@ pub(super) struct Done<'a> {
     pub state: Checkpoint,
     pub seen: Seen,
     pub delay: Option<Delay>,
-    /// From the first shot to the refined cloud.
+    /// Duration from the first shot to the refined cloud.
     pub seconds: f64,
     pub spent: Spent,
-    /// Shots that this run did.
+    /// Number of shots that this run did.
     pub shots_of_this_run: usize,
-    /// Said where a stream was ended before its end.
+    /// A remark if a stream was ended early.
     pub stopped: Option<String>,
     pub points: u64,
     pub refined: Refined,
 }
 
 impl Done<'_> {
-    /// `files`: hashes of what was written, by name.
+    /// `files`: hashes of the written files, by name.
     pub fn report(self, height_map: Option<HeightMapFigures>, files: BTreeMap<String, String>) -> ScanReport {
         let Done { options, scanner, mut state, .. } = self;
         if state.cut > 0 {
@@ -84,7 +84,7 @@ impl Done<'_> {
     }
 }
 
-/// What measures the shots of such pictures, and what looks at their levels.
+/// The scanner for such pictures, and the collector of their levels.
 pub(super) fn scanner_for(
     rig: &Rig,
     pictures: Pictures,

@@ -1,5 +1,5 @@
-//! Scans into memory: the points and the height map that a scan folder would hold, for programs that have their own
-//! pictures. Points are in the frame of what moved (mostly the robot's base), mm.
+//! Scans into memory: the points and the height map of a scan folder, for programs that have their own pictures.
+//! Points are in the frame of the moving part (mostly the robot's base), mm.
 
 use super::done::{Done, scanner_for};
 use super::options::ScanOptions;
@@ -19,18 +19,19 @@ use std::time::Instant;
 
 /// A scan in memory.
 pub struct HeldScan {
-    /// What scan.json would say; it names no files.
+    /// The content of scan.json; it names no files.
     pub report: ScanReport,
     /// The points of cloud.ply, in its order.
     pub points: Vec<CloudPoint>,
-    /// Where the camera stood at each shot.
+    /// Pose of the camera at each shot.
     pub shots: Shots,
-    /// `None` where there are too few points for a map.
+    /// `None` if there are too few points for a map.
     pub map: Option<HeightMap>,
 }
 
 impl HeldScan {
-    /// The points where the sheet's middle meets the rays of their light, as [`super::report::lit_cloud_of`] has them.
+    /// The points where the middle of the laser sheet meets the camera's rays, as in
+    /// [`super::report::lit_cloud_of`].
     pub(in crate::station) fn lit(&self) -> Vec<CloudPoint> {
         let mut points = self.points.clone();
         if self.report.sheet.is_some() {
@@ -40,7 +41,7 @@ impl HeldScan {
     }
 }
 
-/// Points and places as the shots come.
+/// Points and camera poses, collected shot by shot.
 #[derive(Default)]
 struct Gathered {
     points: Vec<CloudPoint>,
@@ -50,19 +51,19 @@ struct Gathered {
 impl Gathered {
     fn take(&mut self, profile: &Profile) -> Result<()> {
         self.points.extend_from_slice(&profile.points);
-        // To the last bit what a scan folder's list of shots gives back: the refined points follow from it.
+        // Identical to the last bit to what a scan folder's list of shots returns: the refined points depend on it.
         let (place, _) = Rigid::from_rows(&profile.from_camera.to_rows())?;
         self.places.push((profile.shot, place));
         Ok(())
     }
 }
 
-/// Scans a source from its first shot to its last and keeps the result in memory; the points are those that a scan
-/// into a folder writes. `label` names what was scanned. Of the options `out`, `overlays`, `resume` and `watch` are
-/// not used. `progress` is told (shots done, shots in all).
+/// Scans a source from its first shot to its last and returns the result in memory, with the points that a scan
+/// into a folder writes. `label` names the scanned object. The options `out`, `overlays`, `resume` and `watch` are
+/// not used. `progress` receives (shots done, shots in all).
 ///
 /// # Errors
-/// A rig that does not suit, a bad shot unless `skip_bad` leaves it out, a stop that was asked for.
+/// The rig is not suitable, a shot is bad and `skip_bad` is not set, or a stop was requested.
 pub fn scan_held(
     label: &str,
     source: &mut dyn Source,
@@ -128,7 +129,7 @@ pub fn scan_held(
     Ok(HeldScan { report: done.report(map.as_ref().map(figures), Default::default()), points, shots, map })
 }
 
-/// The points without what the cloud shows to be wrong with them.
+/// The points after correction of the errors that the cloud itself shows.
 fn refine(
     points: Vec<CloudPoint>,
     shots: Shots,

@@ -1,4 +1,4 @@
-//! Says how a scan is run. Depths are mm.
+//! Options of a scan. Depths are mm.
 
 use super::watch::Watch;
 use crate::capture::Latency;
@@ -10,10 +10,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// How a scan is run.
+/// Options of a scan.
 #[derive(Clone, Debug)]
 pub struct ScanOptions {
-    /// Folder for the results; made where it is missing.
+    /// Folder for the results; it is created if it is missing.
     pub out: PathBuf,
     /// GPU, this machine's processor, or whichever of them is faster.
     pub place: Where,
@@ -23,20 +23,20 @@ pub struct ScanOptions {
     pub grid: GridOptions,
     /// What moved between the shots.
     pub motion: Motion,
-    /// Camera depths at which points are believed; `None` for all ([`crate::station::volume::believed`]).
+    /// Camera depths at which points are accepted; `None` for all ([`crate::station::volume::believed`]).
     pub volume: Option<Volume>,
     /// A picture with the laser off and the shots' exposure, subtracted from every shot.
     pub ambient: Option<Image>,
-    /// Shots to draw with their kept and rejected peaks, evenly spread; 0 for none.
+    /// Number of shots to draw with their kept and rejected peaks, evenly spread; 0 for none.
     pub overlays: usize,
-    /// Leave out shots that cannot be read instead of stopping; they are listed in scan.json.
+    /// Skip shots that cannot be read instead of stopping; they are listed in scan.json.
     pub skip_bad: bool,
-    /// By how much pictures are late against poses, of those that were paired by clock.
+    /// Delay of pictures relative to poses, for pictures that were paired by clock.
     pub latency: Option<Latency>,
     /// Continue an interrupted scan of the same recording with the same rig and settings.
     pub resume: bool,
-    /// Set by somebody who wants the scan to end: it keeps what is done and says how to go on.
+    /// Set from outside to end the scan: it stores the finished shots and reports how to resume.
     pub stop: Arc<AtomicBool>,
-    /// Who looks on while it runs.
+    /// An observer of the running scan.
     pub watch: Watch,
 }

@@ -7,7 +7,7 @@ use crate::scan::{Profile, Shot};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Holds a picture only from its arrival until its profile is there.
+/// Stores a picture only from its arrival until its profile is ready.
 pub(in crate::station) struct Overlays {
     folder: PathBuf,
     every: usize,
@@ -20,7 +20,7 @@ impl Overlays {
         if count > 0 {
             crate::files::make_folder(&folder)?;
         }
-        // Of a pipe of unknown length every 100th shot is drawn.
+        // For a pipe of unknown length every 100th shot is drawn.
         let every = if count == 0 { usize::MAX } else { total.map_or(100, |n| n.div_ceil(count)).max(1) };
         Ok(Overlays { folder, every, held: BTreeMap::new() })
     }

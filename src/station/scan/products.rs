@@ -1,5 +1,5 @@
-//! In: a finished cloud on disk. Out: the files that people and other programs open: height map, its
-//! companions, pictures, PCD.
+//! In: a finished cloud on disk. Out: the files that people and other programs open: height map, its companion
+//! maps, pictures, PCD.
 //! Frame and unit: cloud in the base frame, height map in its grid frame; mm.
 
 use super::report::HeightMapFigures;
@@ -11,11 +11,11 @@ use crate::scan::{CloudFile, GridOptions, HeightMap, grid_on, write_pcd};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Points that a height map is made of, at least.
+/// Fewest points of a height map.
 pub(super) const FEWEST_OF_A_MAP: u64 = 100;
 
-/// Writes everything that is derived from the cloud; no figures where there are too few points for a map. With them
-/// come the SHA-256 of cloud and map by file name.
+/// Writes everything that is derived from the cloud. The figures are `None` if there are too few points for a map.
+/// Also returns the SHA-256 of cloud and map by file name.
 pub fn write(
     out: &Path,
     cloud: &Path,
@@ -41,7 +41,7 @@ pub fn write(
     Ok((Some(figures(&map)), hashes(out, of_cloud?)?))
 }
 
-/// The same around a map that is there already, in the cloud's own grid.
+/// The same for an existing map, in the cloud's own grid.
 pub fn of_map(
     out: &Path,
     cloud: &Path,
@@ -54,7 +54,7 @@ pub fn of_map(
     Ok((figures(map), hashes(out, hash(out, "cloud.ply")?)?))
 }
 
-/// The SHA-256 of a file of the folder, under its name.
+/// Name and SHA-256 of a file of the folder.
 pub fn hash(out: &Path, name: &str) -> Result<(String, String)> {
     Ok((name.to_owned(), hash_file(&out.join(name))?))
 }
@@ -63,7 +63,7 @@ fn hashes(out: &Path, of_cloud: (String, String)) -> Result<BTreeMap<String, Str
     Ok(BTreeMap::from([of_cloud, hash(out, "height.tif")?, hash(out, "height.json")?]))
 }
 
-/// What a report says of a map.
+/// The figures of a map for a report.
 pub(super) fn figures(map: &HeightMap) -> HeightMapFigures {
     let (low, high) = map.quantiles(0.01, 0.99).unwrap_or((0.0, 0.0));
     HeightMapFigures {

@@ -1,5 +1,5 @@
-//! In: finished profiles of a running scan. Out: a sealed checkpoint file to resume from, and running figures
-//! in memory that does not grow with the scan.
+//! In: finished profiles of a running scan. Out: a sealed checkpoint file to resume from, and running figures in
+//! memory that does not grow with the scan.
 //! Frame and unit: counts; sigma in mm; places of the camera in the cloud's frame.
 
 use super::scan_folder::PROGRESS;
@@ -14,37 +14,37 @@ use crate::stages::peak::found::Reject;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Where an interrupted scan stands. Everything in it belongs to points that are on the disk.
+/// State of an interrupted scan. It refers only to points that are on disk.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
     /// Hash of recording, rig, working volume and settings.
     pub identity: String,
-    /// Shots done, the skipped ones included.
+    /// Number of shots done, including skipped ones.
     pub shots: usize,
-    /// Points of the cloud that are on the disk.
+    /// Number of points of the cloud that are on disk.
     pub points: u64,
-    /// Number of peaks by fate: kept, and rejected by reason.
+    /// Number of peaks by rejection reason; accepted ones are listed too.
     pub peaks: BTreeMap<String, u64>,
     /// Indices of the shots without a single point.
     pub dark: Vec<u32>,
-    /// Shots left out: name and reason.
+    /// Skipped shots: name and reason.
     pub skipped: Vec<(String, String)>,
-    /// Pixels that found no room in the stages' list.
+    /// Number of pixels that exceeded the stages' list.
     pub cut: u64,
-    /// What the first shots said of the stripe.
+    /// The stripe as measured in the first shots.
     pub stripe: Option<Stripe>,
-    /// Pixels that the first shots show to shine by themselves.
+    /// Hot pixels, as measured in the first shots.
     pub hot: HotPixels,
-    /// Where the camera was at the first shot, as rows: from there the map's up and the stripe's axis follow.
+    /// Camera pose at the first shot, as rows: it determines the map's up direction and the stripe's axis.
     first_place: Option<[f64; 16]>,
-    /// Fingerprint of the last shot done, which a resumed scan reads again.
+    /// Fingerprint of the last finished shot, which a resumed scan reads again.
     pub last_picture: Option<u32>,
-    /// Standard deviations of the points.
+    /// Histogram of the points' standard deviations.
     pub sigma: Spread,
 }
 
-/// CRC-32 of a picture's levels: tells one recording's picture from another's, whose noise differs.
+/// CRC-32 of a picture's levels. It distinguishes the pictures of two recordings, because their noise differs.
 pub fn fingerprint_of(image: &Image) -> u32 {
     match &image.pixels {
         Pixels::U8(p) => crc32fast::hash(p),
@@ -84,33 +84,34 @@ impl Checkpoint {
         Ok(Some(found))
     }
 
-    /// Puts the cloud on the disk, then says how far it got.
+    /// Writes the cloud to disk, then the checkpoint.
     pub fn save(&mut self, part: &Path, cloud: &mut CloudWriter) -> Result<()> {
         self.points = cloud.checkpoint()?;
         crate::files::write(&part.join(PROGRESS), sealed(self).as_bytes())
     }
 
-    /// Shots done that a resumed scan reads again: the last one, because points are judged by the shots around them.
+    /// Number of finished shots that a resumed scan reads again: the last one, because points are judged by
+    /// neighbouring shots.
     pub(super) fn repeated(&self) -> usize {
         self.shots.min(1)
     }
 
-    /// Where the camera was at the scan's first shot.
+    /// Camera pose at the scan's first shot.
     pub fn first_place(&self) -> Option<Rigid<Base, Camera>> {
-        // Not repaired as poses from outside are: to the last bit what it was.
+        // Not orthonormalized like poses from outside, so that it stays identical to the last bit.
         let m = self.first_place?;
         let rotation = crate::geometry::Mat3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
         Some(Rigid::new(rotation, Vec3::new(m[3], m[7], m[11])))
     }
 
-    /// Keeps where the first shot of all was taken.
+    /// Stores the camera pose of the very first shot.
     pub fn begin_at(&mut self, place: &Rigid<Base, Camera>) {
         self.first_place.get_or_insert(place.to_rows());
     }
 
     /// Counts a finished profile.
     pub fn add(&mut self, profile: &Profile) {
-        // A skipped shot leaves a gap in the indices; resuming goes on behind the last one done.
+        // A skipped shot leaves a gap in the indices; resuming continues after the last finished shot.
         self.shots = profile.shot as usize + 1;
         let mut fates = [0; Reject::ALL.len()];
         profile.peaks.iter().for_each(|peak| fates[peak.reject() as usize] += 1);

@@ -1,5 +1,5 @@
-//! In: a recording, a station. Out: its scan, with the station's own settings; by what a resumed scan knows the
-//! recording.
+//! In: a recording, a station. Out: its scan, with the station's own settings; the identity by which a resumed scan
+//! recognizes the recording.
 //! Frame and unit: cloud in the base frame, mm.
 
 use super::options::ScanOptions;
@@ -15,9 +15,9 @@ use crate::station::volume::believed;
 use std::path::Path;
 
 impl ScanOptions {
-    /// What a station's settings ask for, into the folder `out`: wherever it is fastest, no overlays, no ambient
-    /// picture, nothing skipped, not resumed. `rig` is the station's calibration, which knows the believed depths
-    /// where the settings leave them open.
+    /// Options from a station's settings, into the folder `out`: at the fastest place, no overlays, no ambient
+    /// picture, nothing skipped, not resumed. `rig` is the station's calibration, which gives the accepted depths
+    /// if the settings do not state them.
     pub fn for_station(settings: &Settings, rig: &Rig, out: &Path) -> ScanOptions {
         ScanOptions {
             out: out.to_owned(),
@@ -37,8 +37,8 @@ impl ScanOptions {
     }
 }
 
-/// Scans a recording by the motion that it states, a robot's with the poses of that name (the one that meta.json
-/// names, where it is `None`). `progress` is told (shots done, shots in all).
+/// Scans a recording by the motion that it states. For a robot, `poses` names the pose file; `None` is the one that
+/// meta.json names. `progress` receives (shots done, shots in all).
 ///
 /// # Errors
 /// Those of [`scan`], and of the recording's poses or counts.
@@ -56,14 +56,14 @@ pub fn scan_recording(
     scan(&id, &recording.folder.display().to_string(), open, rig, options, progress)
 }
 
-/// What a resumed scan must have in common with the interrupted one: a hash of meta.json, of the poses or counts, of
-/// the channel and of the ambient picture.
+/// Identity that a resumed scan must share with the interrupted one: a hash of meta.json, of the poses or counts,
+/// of the channel and of the ambient picture.
 fn identity(recording: &Recording, poses: Option<&str>, ambient: Option<&Image>) -> Result<String> {
     let mut meta = hash_file(&recording.folder.join("meta.json"))?;
     if let Some(name) = &recording.meta.frames_file {
         meta += &hash_file(&recording.inside(name)?)?;
     }
-    // Also by a person's word.
+    // The readout may also be stated by a person.
     meta += &recording.meta.image.readout.map_or(String::new(), |r| r.to_string());
     let ambient = ambient.map(|image| match &image.pixels {
         Pixels::U8(px) => hash_text(px),

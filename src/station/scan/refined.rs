@@ -1,6 +1,6 @@
-//! In: the working folder of a scan whose last shot is done. Out: cloud and shots without what the reported places
-//! scatter by, and without what the sheet's thickness does where brightness changes, as far as the surface shows
-//! both; what was measured waits beside them until the scan has its names.
+//! In: the working folder of a scan whose last shot is done. Out: cloud and shots corrected for the scatter of the
+//! reported poses and for the laser sheet's thickness at changes of brightness, as far as the surface shows both.
+//! The measured files stay beside them until the scan is complete.
 //! Frame and unit: the cloud's frame, mm.
 
 use super::scan_folder::{CLOUD_FILE, MEASURED};
@@ -10,19 +10,19 @@ use crate::files::moment;
 use crate::scan::{CloudFile, CloudWriter, Extraction, Format, PathFound, Refining, SHOTS_FILE, SheetFound, Shots};
 use std::path::Path;
 
-/// Where the cloud is made that takes the measured one's name.
+/// Temporary name of the corrected cloud, which then takes the measured one's name.
 const NEXT: &str = "refined.ply";
 
-/// What was told of a scan, and taken out; `None` where nothing is.
+/// What the scan showed and the correction removed; `None` if nothing was found.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Refined {
     pub places: Option<PathFound>,
     pub sheet: Option<SheetFound>,
-    /// Median of the points' standard deviations where they have others than they were measured with, mm.
+    /// Median of the points' corrected standard deviations, mm; `None` if they were not changed.
     pub median_sigma_mm: Option<f64>,
 }
 
-/// `part`: the working folder; `frame`: the cloud's; `shots`: where they were reported.
+/// `part`: the working folder; `frame`: the cloud's frame; `shots`: the shots at their reported poses.
 pub(super) fn refine(
     part: &Path,
     frame: &'static str,

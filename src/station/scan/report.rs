@@ -1,5 +1,4 @@
-//! In: a scan folder. Out: what the scan came to, as scan.json holds it, and its points; both only as they were
-//! written.
+//! In: a scan folder. Out: the scan's report, as in scan.json, and its points; both are checked to be as written.
 //! Frame and unit: cloud in the frame that the report names, mm (docs/file-formats.md).
 
 use super::scan_folder::settle;
@@ -16,7 +15,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What a scan came to; scan.json holds it.
+/// Report of a scan; the content of scan.json.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ScanReport {
@@ -28,104 +27,104 @@ pub struct ScanReport {
     pub created: String,
     /// Unit of all lengths: "mm".
     pub units: String,
-    /// Of the cloud: base, axis, or the flange of a robot that carries the part.
+    /// Frame of the cloud: base, axis, or the flange of a robot that carries the part.
     pub frame: String,
-    /// What moved between the shots; the robot with the sensor in reports of former versions.
+    /// What moved between the shots; reports of earlier versions without it mean the robot with the sensor.
     #[serde(default)]
     pub motion: Motion,
-    /// What was scanned, as the caller named it.
+    /// Name of the recording, as the caller gave it.
     pub recording: String,
     /// [`crate::rig::Rig::fingerprint`] of the calibration used.
     pub rig_fingerprint: String,
-    /// Adapter and driver, or this machine's processor and why.
+    /// Adapter and driver, or this machine's processor and the reason for it.
     pub ran_on: String,
     /// Size and depth of the shots.
     pub image: Format,
-    /// Number of shots done, those left out included.
+    /// Number of shots done, including skipped ones.
     pub shots: usize,
     /// Number of points in the cloud.
     pub points: u64,
-    /// Depths at which points were believed; none where nothing limits them.
+    /// Depths at which points were accepted; `None` if unlimited.
     pub working_volume: Option<Volume>,
-    /// Peaks by fate: kept, and rejected by reason.
+    /// Number of peaks by rejection reason; accepted ones are listed too.
     pub peaks: BTreeMap<String, u64>,
     /// Shots without a single kept peak.
     pub dark_shots: Vec<u32>,
-    /// What became of every picture that the camera sent, where one did.
+    /// Account of every picture that a camera sent; `None` without a camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<Account>,
-    /// From a picture's last byte to its points in the cloud, of a running camera.
+    /// Delay from a picture's last byte to its points in the cloud, for a running camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub delay: Option<Delay>,
-    /// Shots left out, with the reason.
+    /// Skipped shots, with the reason.
     pub skipped: Vec<(String, String)>,
-    /// Median over the points of the standard deviation that each carries, mm; none without points.
+    /// Median of the points' standard deviations, mm; `None` without points.
     pub median_sigma_mm: Option<f64>,
     /// Width (px) and speckle of the stripe, measured in the first shots or as set.
     pub stripe: Option<Stripe>,
-    /// How the places scatter that the robot or the axis reported, where a surface shows it.
+    /// Scatter of the poses that the robot or the axis reported, if a surface shows it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub places: Option<PathFound>,
-    /// How thick the sheet is where brightness changes, where the cloud shows it; what that does is taken out of the
-    /// points.
+    /// Thickness of the laser sheet as seen at changes of brightness, if the cloud shows it; its effect is removed
+    /// from the points.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sheet: Option<SheetFound>,
-    /// Pixels of the sensor that shine by themselves; their neighbours stood for them.
+    /// Number of hot pixels of the sensor; they were replaced by their neighbours.
     #[serde(default)]
     pub hot_pixels: usize,
-    /// Levels of the pictures and where their light lies.
+    /// Levels of the pictures and the area of their light.
     pub seen: Seen,
-    /// From the first shot to the closed cloud.
+    /// Duration from the first shot to the closed cloud, s.
     pub seconds: f64,
-    /// Of this run: shots that an earlier run did are not counted.
+    /// Rate of this run: shots of an earlier run are not counted.
     pub shots_per_second: f64,
-    /// Where the time went.
+    /// Durations by activity.
     pub spent: Spent,
-    /// Extraction settings as they were given.
+    /// Extraction settings as given.
     pub settings: Extraction,
-    /// `None` where there were too few points for a map.
+    /// `None` if there were too few points for a map.
     pub height_map: Option<HeightMapFigures>,
-    /// What the calibrations' own files say against them, and what else a reader of the figures must know.
+    /// Warnings in the calibration files, and other remarks that a reader of the figures must know.
     pub remarks: Vec<String>,
     /// SHA-256 of the cloud and of the height map, by file name.
     pub files: BTreeMap<String, String>,
-    /// Where the points came from that no rig of this program measured.
+    /// Origin of points that no rig of this program measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub imported: Option<Imported>,
-    /// What was taken away of a former scan.
+    /// What was removed from an earlier scan by filters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub filtered: Option<Filtered>,
 }
 
-/// Which scan was filtered, and how.
+/// The scan that was filtered, and the filters.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Filtered {
-    /// Its folder's name.
+    /// Name of the scan's folder.
     pub scan: String,
     /// SHA-256 of its scan.json.
     pub sha256: String,
-    /// In the order in which they were applied.
+    /// The filters in the order in which they were applied.
     pub filters: Vec<Filter>,
-    /// Cells that each took.
+    /// Number of cells that each filter removed.
     pub cells: Vec<usize>,
 }
 
-/// What an imported file was, and what its user stated about it.
+/// An imported file, and what its user stated about it.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Imported {
-    /// Its name.
+    /// Name of the file.
     pub file: String,
-    /// SHA-256 of it.
+    /// SHA-256 of the file.
     pub sha256: String,
-    /// The page of it that was chosen, from 1 on.
+    /// The selected page of the file, counted from 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub page: Option<usize>,
-    /// SHA-256 of the picture of the light that came with it.
+    /// SHA-256 of the intensity picture that belongs to it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub light_sha256: Option<String>,
-    /// mm in one level or coordinate, as stated.
+    /// Length of one level or one coordinate unit, mm, as stated.
     pub unit_mm: f64,
     /// Distance of columns and rows, as stated, mm.
     pub spacing_mm: Option<[f64; 2]>,
@@ -139,28 +138,28 @@ pub struct Imported {
     pub sigma_mm: f64,
 }
 
-/// Bytes of a height map's file: 64 million cells and what stands before them.
+/// Most bytes of a height map's file: 64 million cells and the header.
 const MOST_OF_A_MAP: u64 = 257 << 20;
 
-/// Of the reports that this version writes; format 1 had no hashes.
+/// Version of the reports that this version writes; format 1 had no hashes.
 pub(in crate::station) const FORMAT: u32 = 2;
 
-/// Seconds of a scan by what its main thread did; pictures are decoded and stages run meanwhile on other threads, so
-/// only what had to be waited for counts.
+/// Duration of a scan by activity of its main thread, s. Pictures are decoded and stages run on other threads
+/// meanwhile, so only waiting for them counts.
 #[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spent {
-    /// Opening the GPU and the recording, until the first shot could be handed over.
+    /// Opening the GPU and the recording, until the first shot could be submitted.
     pub start_s: f64,
-    /// Until the first profile was there; stages are compiled in it.
+    /// Until the first profile was ready, including compilation of the stages.
     pub first_profile_s: f64,
     /// Waiting for decoded pictures.
     pub pictures_s: f64,
-    /// Handing shots to the stages and waiting for them; judging points by their neighbours.
+    /// Submitting shots to the stages and waiting for them; judging points by their neighbours.
     pub stages_s: f64,
-    /// Cloud, overlays and checkpoints.
+    /// Writing cloud, overlays and checkpoints.
     pub writing_s: f64,
-    /// Height map, pictures and PCD, after the last shot.
+    /// Making height map, pictures and PCD after the last shot.
     pub products_s: f64,
 }
 
@@ -176,14 +175,14 @@ pub struct HeightMapFigures {
     pub cell_mm: f64,
     /// Share of the cells that hold a height.
     pub coverage: f64,
-    /// Heights between which 98 % of the cells lie, mm above the grid's plane.
+    /// Lower limit of the heights of the middle 98 % of the cells, mm above the grid's plane.
     pub z_low_mm: f64,
-    /// The upper one of the two, mm above the grid's plane.
+    /// Upper limit of those heights, mm above the grid's plane.
     pub z_high_mm: f64,
 }
 
 impl ScanReport {
-    /// Refuses a scan without points, and says what its pictures hold.
+    /// Refuses a scan without points, and reports what its pictures contain.
     pub fn has_points(&self) -> Result<()> {
         if self.points > 0 {
             return Ok(());
@@ -196,7 +195,7 @@ impl ScanReport {
             .next(next))
     }
 
-    /// Refuses files of a scan folder that are not those that the scan wrote.
+    /// Refuses a scan folder whose files differ from those that the scan wrote.
     pub(in crate::station) fn check_files(&self, scan: &Path) -> Result<()> {
         self.files.par_iter().try_for_each(|(name, hash)| {
             let path = scan.join(name);
@@ -244,7 +243,7 @@ pub fn load_report(scan: &Path) -> Result<ScanReport> {
 /// As [`Shots::load`].
 pub fn shots_of(scan: &Path) -> Result<Shots> {
     let report = load_report(scan)?;
-    // Its lines lie from column to column, whatever sensor they are from.
+    // The lines of an imported map run from column to column, whatever its sensor.
     if report.imported.is_some() {
         return Ok(Shots::unplaced(Along::U));
     }
@@ -252,9 +251,9 @@ pub fn shots_of(scan: &Path) -> Result<Shots> {
     Ok(shots.with_stripe(report.stripe.map(|s| s.width_px)))
 }
 
-/// The points of a finished scan where the sheet's middle meets the rays of their light, checked as those of
-/// [`cloud_of`]: what finds a part's edges in them takes the sheet to be thick ([`crate::scan::Thick`] has moved them
-/// off it).
+/// The points of a finished scan where the middle of the laser sheet meets the camera's rays, checked like those of
+/// [`cloud_of`]. Edge detection assumes a laser sheet of finite thickness, so it needs the points before
+/// [`crate::scan::Thick`] moved them off the sheet.
 pub fn lit_cloud_of(scan: &Path) -> Result<Vec<CloudPoint>> {
     let mut cloud = cloud_of(scan)?;
     if load_report(scan)?.sheet.is_some() {
@@ -270,7 +269,7 @@ pub fn cloud_of(scan: &Path) -> Result<Vec<CloudPoint>> {
     read_cloud(&scan.join("cloud.ply"))
 }
 
-/// A finished scan with its points on the disk, all of it checked to be what the scan wrote: report, shots, cloud.
+/// A finished scan with its points on disk, completely checked against what the scan wrote: report, shots, cloud.
 ///
 /// # Errors
 /// As [`cloud_of`] and [`shots_of`]: a scan without points, files that are missing, cut off, or of another scan.
@@ -281,8 +280,8 @@ pub fn whole_scan(scan: &Path) -> Result<(ScanReport, Shots, CloudFile)> {
     Ok((report, shots, cloud))
 }
 
-/// A scan that has points, and its cloud, whose header and length alone were looked at: what is not a cloud is not
-/// worth hashing.
+/// A scan with points, and its cloud, of which only header and length are checked so far: a file that is not a
+/// cloud is not worth hashing.
 fn opened(scan: &Path) -> Result<(ScanReport, CloudFile)> {
     settle(scan)?;
     if !scan.join("cloud.ply").exists() {

@@ -1,7 +1,7 @@
-//! In: a source of shots, a calibrated rig, an output folder. Out: the scan folder — cloud, height
-//! map, overlays, figures — written so that whatever ends it costs nothing that was done.
-//! Frame and unit: cloud in the frame of what moved (mostly the robot's base), height map in its grid frame; mm
-//! (docs/file-formats.md).
+//! In: a source of shots, a calibrated rig, an output folder. Out: the scan folder — cloud, height map, overlays,
+//! figures — written so that no interruption loses finished work.
+//! Frame and unit: cloud in the frame of the moving part (mostly the robot's base), height map in its grid frame;
+//! mm (docs/file-formats.md).
 
 use super::done::{Done, scanner_for};
 use super::options::ScanOptions;
@@ -23,10 +23,10 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// Shots between two checkpoints: what a crash can cost beside those under way.
+/// Number of shots between two checkpoints: what a crash can lose besides the shots being processed.
 const CHECKPOINT_SHOTS: usize = 64;
 
-/// [`scan_on`] where the options say; the device is opened while the first pictures are decoded.
+/// [`scan_on`] at the place of the options; the device is opened while the first pictures are decoded.
 pub fn scan(
     id: &str,
     label: &str,
@@ -38,11 +38,11 @@ pub fn scan(
     scan_on(|| options.place.open(), id, label, open, rig, options, progress)
 }
 
-/// Runs a scan from the first shot to the last file. `processor` is asked for once the source is open; `id` names the
-/// recording (a hash of its meta.json, poses and ambient picture), so that a resumed scan cannot continue another
-/// one; `open` gives the source from a shot on; `progress` is told (shots done, shots in all). Whatever ends it
-/// early, the shots that were done stay done and the next run can resume there; a former scan in the folder stays
-/// until this one is whole.
+/// Runs a scan from the first shot to the last file. `processor` is called once the source is open. `id` identifies
+/// the recording (a hash of its meta.json, poses and ambient picture), so that a resumed scan cannot continue
+/// another one. `open` returns the source from a given shot on. `progress` receives (shots done, shots in all). If
+/// the scan ends early, its finished shots are stored and the next run can resume there. A previous scan in the
+/// folder stays until this one is complete.
 pub fn scan_on(
     processor: impl FnOnce() -> Result<Processor>,
     id: &str,
@@ -54,7 +54,7 @@ pub fn scan_on(
 ) -> Result<ScanReport> {
     let begun = Instant::now();
     options.grid.check()?;
-    // What others moved is of no concern here, nor whether it was calibrated with this camera.
+    // Calibrations that this motion does not use are ignored, even if they were made with another camera.
     let rig = &parts_for(rig, &options.motion);
     rig.belong_together()?;
     rig.reaches(options.volume.as_ref())?;
@@ -70,7 +70,7 @@ pub fn scan_on(
     work.spent.start_s = begun.elapsed().as_secs_f64();
     let total = work.total;
     let ended = work.all(source.as_mut(), options, |done| progress(done, total));
-    // Where the disk itself failed, the checkpoint before this one stands.
+    // If the disk itself failed, the previous checkpoint remains.
     let saved = work.save();
     ended.map_err(|fault| kept(fault, &work.state, saved.is_ok(), total))?;
     saved?;
@@ -82,7 +82,7 @@ pub fn scan_on(
     Ok(report)
 }
 
-/// Where the scan begins: at nothing, or where an interrupted one of the same identity stands.
+/// The initial state: empty, or that of an interrupted scan of the same identity.
 fn state(id: &str, rig: &Rig, options: &ScanOptions, part: &Path) -> Result<Checkpoint> {
     let settings = serde_json::to_string(&(&options.extraction, &options.volume, &options.motion, &options.latency))
         .expect("plain data");
@@ -102,7 +102,7 @@ fn state(id: &str, rig: &Rig, options: &ScanOptions, part: &Path) -> Result<Chec
     }
 }
 
-/// Adds to what ended a scan what is kept of it and how to go on.
+/// Adds to the fault that ended a scan what is stored of it and how to resume.
 fn kept(fault: Fault, state: &Checkpoint, saved: bool, total: Option<usize>) -> Fault {
     let of = total.map_or(String::new(), |n| format!(" of {n}"));
     let done = format!("{}{of} shots with {} points are kept", state.shots, state.points);
@@ -110,16 +110,16 @@ fn kept(fault: Fault, state: &Checkpoint, saved: bool, total: Option<usize>) -> 
     Fault { what, ..fault }
 }
 
-/// A scan under way.
+/// A running scan.
 struct Work<'a> {
     part: &'a Path,
     started: Instant,
-    /// Shots that an earlier run finished, and those of them that this one reads again.
+    /// Number of shots that an earlier run finished, and how many of them this run reads again.
     first: usize,
     repeated: usize,
-    /// Shots in all, where that is known.
+    /// Total number of shots, if known.
     total: Option<usize>,
-    /// Pixels that found no room in the runs before.
+    /// Number of pixels that exceeded the list in earlier runs.
     cut_before: u64,
     cloud: CloudWriter,
     shots: ShotsWriter,
@@ -127,16 +127,16 @@ struct Work<'a> {
     scanner: Scanner,
     overlays: Overlays,
     seen: Seen,
-    /// Fingerprints of the pictures under way, and when they were here, oldest first.
+    /// Fingerprints of the pictures being processed, and their arrival times, oldest first.
     pictures: VecDeque<(u32, u32, Option<u64>)>,
     delays: Delays,
     spent: Spent,
-    /// Said in the report where a stream was ended before its end.
+    /// A remark for the report if a stream was ended early.
     stopped: Option<String>,
 }
 
 impl<'a> Work<'a> {
-    /// Opens all that shots go to, as an interrupted run left it where `state` is of one.
+    /// Opens all outputs for shots; for the `state` of an interrupted run it continues that run's files.
     fn begin(
         part: &'a Path,
         rig: &Rig,
@@ -182,7 +182,7 @@ impl<'a> Work<'a> {
         })
     }
 
-    /// Every shot of the source, to its points in the cloud.
+    /// Processes every shot of the source to points in the cloud.
     fn all(&mut self, source: &mut dyn Source, options: &ScanOptions, mut progress: impl FnMut(usize)) -> Result<()> {
         let mut ended = false;
         let started = Instant::now();
@@ -196,7 +196,7 @@ impl<'a> Work<'a> {
                         .cause("Ctrl-C, or the session or the machine was closed")
                         .next("run the same command with --resume to go on"));
                 }
-                // A stream cannot be had again: what came of it is made a scan.
+                // A stream cannot be repeated: the shots so far are made a scan.
                 self.stopped = Some("the stream was stopped by a signal before its end".into());
                 next = None;
             }
@@ -208,11 +208,11 @@ impl<'a> Work<'a> {
                     clocked(&mut self.spent.stages_s, || self.scanner.push(shot))?;
                     self.scanner.first().iter().for_each(|place| self.state.begin_at(place));
                 }
-                // A resumed scan may meet a bad shot that the run before has listed.
+                // A resumed scan may meet a bad shot that the earlier run has listed.
                 Some(Err(bad)) if options.skip_bad && self.state.skipped.iter().any(|(name, _)| *name == bad.name) => {}
                 Some(Err(bad)) if options.skip_bad && !bad.last => self.state.skipped.push((bad.name, bad.fault.what)),
                 Some(Err(BadShot { name, fault, last, .. })) => {
-                    // The last good shot is not taken: it still waits to be judged by its neighbour.
+                    // The last good shot is not taken: its points are not yet judged by their neighbours.
                     let ready = self.scanner.ready()?;
                     self.take(&ready)?;
                     let again = "repair the shot and run again with --resume, or leave it out with --skip-bad";
@@ -234,7 +234,7 @@ impl<'a> Work<'a> {
         Ok(())
     }
 
-    /// The first shot of a resumed scan is the last one that is done: its picture must be the one that it was.
+    /// The first shot of a resumed scan is the last finished one: its picture must be the same as before.
     fn same_recording(&mut self, shot: &crate::scan::Shot) -> Result<()> {
         let is = fingerprint_of(&shot.image);
         if self.repeated > 0 && self.pictures.is_empty() && self.state.last_picture != Some(is) {
@@ -256,7 +256,7 @@ impl<'a> Work<'a> {
                 continue;
             }
             self.overlays.draw(profile)?;
-            // Points and state go together: what is counted here is what a resumed scan keeps.
+            // Points and state are updated together: what is counted here is what a resumed scan has stored.
             self.cloud.append(&profile.points)?;
             self.shots.add(profile.shot, profile.from_camera);
             self.state.add(profile);
@@ -276,7 +276,7 @@ impl<'a> Work<'a> {
         self.state.save(self.part, &mut self.cloud)
     }
 
-    /// What is derived from the whole cloud, and the report of it all.
+    /// Makes everything that is derived from the whole cloud, and the report.
     fn finish(self, label: &str, rig: &Rig, options: &ScanOptions, source: &dyn Source) -> Result<ScanReport> {
         let Work { part, cloud, state, scanner, mut spent, .. } = self;
         let points = cloud.finish()?;
@@ -310,7 +310,7 @@ impl<'a> Work<'a> {
     }
 }
 
-/// Adds the time that something takes to a sum of seconds.
+/// Adds the duration of a call to a sum of seconds.
 fn clocked<T>(seconds: &mut f64, what: impl FnOnce() -> T) -> T {
     let from = Instant::now();
     let result = what();

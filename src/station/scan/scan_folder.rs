@@ -1,5 +1,5 @@
-//! In: a folder that a scan writes into or was written into. Out: its working folder, its files' names, and the rule
-//! that it holds one scan, whole.
+//! In: a folder of a scan, unfinished or finished. Out: its working folder, its files' names, and the rule that it
+//! holds one complete scan.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
@@ -8,8 +8,8 @@ use crate::scan::SHOTS_FILE;
 use std::io::Result as Io;
 use std::path::Path;
 
-/// Everything that a scan leaves in its folder, and what is made of it there; the report first, because without it
-/// the rest is no scan.
+/// All files of a scan folder, including those that are made from the scan later. The report comes first, because
+/// without it the rest is not a scan.
 const FILES: [&str; 21] = [
     "scan.json",
     "index.html",
@@ -29,34 +29,34 @@ const FILES: [&str; 21] = [
     "overlays",
     "errors.json",
     "error_picture.png",
-    // Where former versions kept an interrupted scan.
+    // Earlier versions stored an interrupted scan here.
     "cloud.ply.part",
     FORMER_PROGRESS,
     "found.json",
 ];
 pub(super) const CLOUD_FILE: &str = "cloud.ply";
-/// Cloud and shots as measured, in the working folder, under the names of those that are not done: an interrupted
-/// scan goes on with these.
+/// Cloud and shots as measured, in the working folder, under the names of unfinished files: an interrupted scan
+/// resumes with these.
 pub(super) const MEASURED: [&str; 2] = ["cloud.ply.part", "shots.jsonl.part"];
-/// How far a scan of a former version got.
+/// Progress of a scan of an earlier version.
 pub(super) const FORMER_PROGRESS: &str = "scan.progress.json";
 
-/// Whether a name is one that a scan folder uses itself.
+/// Whether a scan folder itself uses a name.
 pub fn of_a_scan(name: &str) -> bool {
     FILES.contains(&name) || ["scan.part", "scan.whole", "scan.moving", "scan.lock"].contains(&name)
 }
 
-/// How far an interrupted scan got; in the working folder.
+/// Progress of an interrupted scan; in the working folder.
 pub(in crate::station) const PROGRESS: &str = "progress.json";
 
-/// The scan's files: made in `scan.part`, where an interrupted scan waits to be resumed, then moved up together.
+/// The scan's files: written in `scan.part`, where an interrupted scan waits to be resumed, then moved up together.
 pub(in crate::station) fn together(out: &Path) -> Together<'_> {
     Together::new(out, "scan", clear)
 }
 
-/// Takes the former scan away when the new one is whole.
+/// Removes the previous scan when the new one is complete.
 fn clear(out: &Path, whole: &Path) -> Io<()> {
-    // Parts found in the former scan are named in its list.
+    // The previous scan's list names the parts found in it.
     #[derive(serde::Deserialize)]
     struct Found {
         name: String,
@@ -72,12 +72,12 @@ fn clear(out: &Path, whole: &Path) -> Io<()> {
     remove(&whole.join(PROGRESS))
 }
 
-/// Ends what a stopped process has begun in a scan folder; whoever reads one asks for it first.
+/// Completes what a stopped process has begun in a scan folder; every reader calls it first.
 pub(in crate::station) fn settle(scan: &Path) -> Result<()> {
     together(scan).settle()
 }
 
-/// Makes the folder, and refuses one that is something else.
+/// Makes the folder; refuses one that holds something else.
 pub(in crate::station) fn make(out: &Path) -> Result<()> {
     for (file, what) in [("meta.json", "a recording"), ("station.toml", "a station")] {
         if out.join(file).exists() {
@@ -94,7 +94,7 @@ pub(in crate::station) fn make(out: &Path) -> Result<()> {
     crate::files::make_folder(out)
 }
 
-/// What a killed process left half-written in the working folder of a scan that is resumed.
+/// Removes partial files of a killed process from the working folder of a scan that is resumed.
 pub(in crate::station) fn sweep(part: &Path) -> Result<()> {
     crate::files::sweep(part)
         .and_then(|()| crate::files::sweep(&part.join("overlays")))

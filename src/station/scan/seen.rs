@@ -1,5 +1,5 @@
-//! In: a few shots of a scan. Out: what they look like: levels, saturation, where the light lies, beside where it was
-//! looked for.
+//! In: a few shots of a scan. Out: their appearance: levels, saturation, the area of their light compared with the
+//! area that was searched.
 //! Frame and unit: pixels; grey levels of the recording's depth.
 
 use crate::camera::Intrinsics;
@@ -10,9 +10,9 @@ use crate::raster::{Image, Pixels};
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Seen {
-    /// Number of shots looked at.
+    /// Number of shots examined.
     pub pictures: u32,
-    /// Median of the pictures' medians, the brightest pixel of all, and the level of a saturated one.
+    /// Median of the pictures' median levels.
     pub median_level: u16,
     /// Level of the brightest pixel in all of them.
     pub brightest_level: u16,
@@ -20,7 +20,7 @@ pub struct Seen {
     pub full_scale: u16,
     /// Largest share of saturated pixels in a picture.
     pub saturated: f64,
-    /// x0, y0, x1, y1 around all pixels nearer to their picture's brightest level than to its median.
+    /// x0, y0, x1, y1 around all pixels closer to their picture's brightest level than to its median.
     pub light_px: Option<[u32; 4]>,
     /// x0, y0, x1, y1 around the pixels in which the laser plane lies within the working volume.
     pub looked_for_px: Option<[u32; 4]>,
@@ -28,13 +28,13 @@ pub struct Seen {
     medians: Vec<u16>,
 }
 
-/// A picture whose brightest pixel is below this share of full scale is dark.
+/// A picture whose brightest pixel is below this share of full scale counts as dark.
 const DARK: f64 = 0.06;
-/// A picture with more than this share of its pixels saturated is white.
+/// A picture with more than this share of saturated pixels counts as white.
 const WHITE: f64 = 0.2;
 
 impl Seen {
-    /// Nothing yet; the laser plane is looked for in the camera's picture at these depths, mm.
+    /// An empty collection; computes where the laser plane is visible at these depths, mm.
     pub fn new(camera: &Intrinsics, plane: &Plane<Camera>, depth_mm: [f64; 2]) -> Seen {
         const STEPS: u32 = 64;
         let at = |i: u32, side: u32| u32::min(i * side / STEPS, side - 1);
@@ -49,7 +49,7 @@ impl Seen {
         seen
     }
 
-    /// Looks at a shot, if it is one of those that are looked at.
+    /// Examines a shot if its index is 0 or a power of two.
     pub fn look(&mut self, index: u32, image: &Image) {
         if index != 0 && !index.is_power_of_two() {
             return;
@@ -90,7 +90,7 @@ impl Seen {
         }
     }
 
-    /// One sentence for people.
+    /// The findings in one sentence.
     pub fn words(&self) -> String {
         let place = |b: Option<[u32; 4]>| {
             b.map_or("nowhere".into(), |[x0, y0, x1, y1]| format!("in columns {x0} to {x1}, rows {y0} to {y1}"))
@@ -109,7 +109,7 @@ impl Seen {
         )
     }
 
-    /// Likely cause and next step where nothing was measured.
+    /// Likely cause and next step if nothing was measured.
     pub fn why(&self) -> (&'static str, &'static str) {
         let full = f64::from(self.full_scale);
         let apart = match (self.light_px, self.looked_for_px) {

@@ -1,5 +1,5 @@
-//! In: the points of a cloud as they come. Out: the median of the standard deviations that they carry, in memory that
-//! does not grow.
+//! In: the points of a cloud, chunk by chunk. Out: the median of their standard deviations, in memory that does not
+//! grow.
 //! Frame and unit: mm.
 
 use crate::scan::CloudPoint;
@@ -25,9 +25,9 @@ impl Spread {
         }
     }
 
-    /// To 3 %; none without points.
+    /// The median to 3 %; `None` without points.
     pub fn median_mm(&self) -> Option<f64> {
-        // A damaged checkpoint may hold any numbers.
+        // A damaged checkpoint may contain any numbers.
         let half = self.0.iter().map(|n| u128::from(*n)).sum::<u128>().div_ceil(2);
         let mut sum = 0;
         let bin = self.0.iter().position(|n| {
@@ -37,7 +37,7 @@ impl Spread {
         bin.map(|b| 10f64.powf((b as f64 + 0.5) / 40.0 - 5.0))
     }
 
-    /// Steps that it lacks or has too many, where it is of another version.
+    /// A remark on a wrong number of bins, as another version would have.
     pub fn strange(&self) -> Option<String> {
         let has = self.0.len();
         (has != BINS).then(|| format!("has {has} steps of sigma, {BINS} are needed"))
@@ -55,7 +55,7 @@ mod tests {
         assert_eq!(spread.median_mm(), None);
         spread.add(&[of(0.01), of(0.02), of(0.3)]);
         assert!((spread.median_mm().unwrap() / 0.02 - 1.0).abs() < 0.03);
-        // What no histogram holds lies in its last steps.
+        // Values outside the histogram are counted in its end bins.
         spread.add(&[of(f32::INFINITY), of(0.0)]);
         assert!((spread.median_mm().unwrap() / 0.02 - 1.0).abs() < 0.03);
     }

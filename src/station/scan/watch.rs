@@ -1,5 +1,4 @@
-//! In: finished profiles of a running scan. Out: the same to somebody who looks on, e.g. a screen; never slower than
-//! the looker.
+//! In: finished profiles of a running scan. Out: the same profiles for an observer, e.g. a screen.
 //! Frame and unit: points in the cloud's frame, mm; `up` is a unit vector in it.
 
 use crate::geometry::Vec3;
@@ -7,15 +6,16 @@ use crate::scan::Profile;
 use std::fmt;
 use std::sync::Arc;
 
-/// Who looks on.
+/// An observer's function.
 type Look = dyn Fn(&Profile, &Vec3) + Send + Sync;
 
-/// Looks on while a scan runs; by default nobody. What it does is waited for, so it has to be short.
+/// An observer of a running scan; by default none. The scan waits for its function, which therefore has to be
+/// short.
 #[derive(Clone, Default)]
 pub struct Watch(Option<Arc<Look>>);
 
 impl Watch {
-    /// `look` is shown each profile that reached the cloud, with the direction towards the camera.
+    /// `look` receives each profile that reached the cloud, with the direction towards the camera.
     pub fn new(look: impl Fn(&Profile, &Vec3) + Send + Sync + 'static) -> Watch {
         Watch(Some(Arc::new(look)))
     }

@@ -1,5 +1,5 @@
-//! In: a listener, a session. Out: one robot's program at a time, a line for each of its lines; whoever comes
-//! meanwhile is told so.
+//! In: a listener, a session. Out: serves one robot's program at a time, one answer for each line; other clients
+//! are turned away meanwhile.
 //! Frame and unit: bytes, lines end with LF, CR or both, answers with LF; s.
 
 use super::session::Session;
@@ -9,29 +9,29 @@ use std::net::{Shutdown, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// How often is looked whether somebody else has come, or the server is to end.
+/// How often new connections and the end of the server are checked.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// How long is waited for a program.
+/// How long the server waits for a program.
 #[derive(Clone, Copy, Debug)]
 pub struct Patience {
-    /// For the next line.
+    /// Time until the next line.
     pub idle: Duration,
-    /// For the rest of a line that was begun.
+    /// Time for the rest of a line that was begun.
     pub line: Duration,
 }
 
 impl Default for Patience {
-    /// Ten minutes between two lines: a person may have stopped the arm. Ten seconds within one.
+    /// Ten minutes between two lines, because a person may have stopped the arm; ten seconds within a line.
     fn default() -> Patience {
         Patience { idle: Duration::from_secs(600), line: Duration::from_secs(10) }
     }
 }
 
-/// Serves until `stop`; `told` hears every line that came and every answer.
+/// Serves until `stop`; `told` receives every line and every answer.
 ///
 /// # Errors
-/// The listener's own.
+/// Those of the listener.
 pub fn serve(
     listener: &TcpListener,
     session: &mut Session,
@@ -49,14 +49,14 @@ pub fn serve(
                 told(&format!("{from} has gone: {why}"));
             }
             Err(e) if e.kind() == ErrorKind::WouldBlock => std::thread::sleep(LOOK),
-            // A client that was gone before it was looked at.
+            // The client closed the connection before it was accepted.
             Err(_) => std::thread::sleep(LOOK),
         }
     }
     Ok(())
 }
 
-/// One program from its first line to its last; why it ended.
+/// Serves one program from its first line to its last; returns why it ended.
 fn one(
     listener: &TcpListener,
     mut stream: &TcpStream,
@@ -128,8 +128,8 @@ fn ended(mut stream: &TcpStream, wrong: &Wrong) -> String {
     answer
 }
 
-/// A connection closed with bytes unread is reset, and a reset overtakes what was said [rfc1122 4.2.2.13]: the rest
-/// is read, for a moment.
+/// Reads the rest for a moment. Closing a connection with unread bytes resets it, and the reset can discard the
+/// answer before it is read [rfc1122 4.2.2.13].
 fn let_it_be_read(mut stream: &TcpStream) {
     let (begun, mut rest) = (Instant::now(), [0u8; 1024]);
     let _ = stream.shutdown(Shutdown::Write);
@@ -137,7 +137,7 @@ fn let_it_be_read(mut stream: &TcpStream) {
     while begun.elapsed() < 2 * LOOK && stream.read(&mut rest).is_ok_and(|n| n > 0) {}
 }
 
-/// Whoever has come while another is served; one at a time: the other is being waited on.
+/// Turns away a client that connects while another is served, so that it does not wait.
 fn turn_away(listener: &TcpListener) {
     if let Ok((mut stream, _)) = listener.accept() {
         let _ = stream.set_write_timeout(Some(LOOK));

@@ -1,5 +1,5 @@
-//! In: requests of a robot's program, one after the other; a camera, a station, recipes. Out: what is done about
-//! each, and its answer.
+//! In: requests of a robot's program, one after the other; a camera, a station, recipes. Out: the action for each,
+//! and its answer.
 //! Frame and unit: base_from_flange as the notation has it, mm here; tool 0 and work frame 0 on the controller.
 
 use super::words::{self, Code, Of, Request, Which, Wrong};
@@ -21,14 +21,14 @@ use crate::station::settings::Settings;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Shots of one scan; more are a program that does not end.
+/// Most shots of one scan; a program that takes more does not end.
 const MOST_SHOTS: usize = 5000;
-/// A flange this near to its base's origin, mm, is stated in another unit; one that far off too.
+/// Accepted distance of the flange from its base's origin, mm; outside this range the pose is in another unit.
 const BELIEVED_MM: [f64; 2] = [50.0, 10_000.0];
-/// A pose as near as this to that of the shot before is that shot, asked for again: mm and rad.
+/// A pose within this distance of the previous shot's is a repeated request for that shot; mm and rad.
 const SAME: [f64; 2] = [0.002, 2e-6];
 
-/// What a session works on.
+/// Inputs and options of a session.
 #[derive(Clone, Debug)]
 pub struct SocketOptions {
     /// Folder of the station.
@@ -37,20 +37,20 @@ pub struct SocketOptions {
     pub recipes: PathBuf,
     /// Folder of the scans, one folder each.
     pub out: PathBuf,
-    /// Notation of all poses, asked for and given.
+    /// Notation of all poses, received and sent.
     pub notation: Convention,
     /// Where the scan's stages run.
     pub place: Where,
 }
 
-/// A scan that is made.
+/// A scan in progress.
 struct Scan {
     record: Record,
     shots: usize,
     last: Rigid<Base, Flange>,
 }
 
-/// What one robot's program has come to.
+/// State of a session with one robot's program.
 pub struct Session {
     options: SocketOptions,
     settings: Settings,
@@ -64,10 +64,11 @@ pub struct Session {
 type Said = std::result::Result<String, Wrong>;
 
 impl Session {
-    /// A station that can answer.
+    /// A session with a station that has all it needs.
     ///
     /// # Errors
-    /// The station lacks a calibration, the camera is another one, there is no such folder of recipes.
+    /// The station lacks a calibration, the camera differs from the calibrated one, or there is no such folder of
+    /// recipes.
     pub fn new(options: SocketOptions, camera: Box<dyn PictureSource>) -> Result<Session> {
         let (settings, rig) = (Settings::load(&options.station)?, Rig::load(&options.station)?);
         rig.belong_together()?;
@@ -84,12 +85,12 @@ impl Session {
         Ok(Session { options, settings, rig, camera, scan: None, found: None, scans: 0 })
     }
 
-    /// Another program has come: it knows nothing of what the one before did.
+    /// Resets the session for another program, which knows nothing of the previous one.
     pub fn afresh(&mut self) {
         (self.scan, self.found) = (None, None);
     }
 
-    /// Does what a line asks for, and answers it with one.
+    /// Executes the request of a line and returns the answer line.
     pub fn answer(&mut self, line: &str) -> String {
         let said = words::read(line).and_then(|request| self.done(request));
         said.map_or_else(|wrong| words::no(&wrong), |yes| words::yes(&yes))
@@ -117,7 +118,7 @@ impl Session {
 
     fn begin(&mut self) -> Said {
         self.found = None;
-        // Folders of former runs stay.
+        // Folders of earlier runs stay.
         let free = (self.scans..).find(|k| !self.options.out.join(format!("scan_{k:04}")).exists());
         self.scans = free.expect("numbers do not end");
         let folder = self.options.out.join(format!("scan_{:04}", self.scans));
@@ -142,7 +143,7 @@ impl Session {
         }
         let (angle, mm) = at.difference(&scan.last);
         if scan.shots > 0 && mm < SAME[0] && angle < SAME[1] {
-            // The answer was lost, and it is asked for again.
+            // The answer was lost, and the program repeats the request.
             return Ok(scan.shots.to_string());
         }
         if scan.shots >= MOST_SHOTS {
@@ -217,7 +218,7 @@ impl Session {
     }
 }
 
-/// A fault on our side; a refusal is the part's.
+/// Our fault as an answer; a refusal concerns the part.
 fn ours(fault: Fault) -> Wrong {
     Wrong::new(if fault.kind == Kind::Refused { Code::Refused } else { Code::Failed }, fault.what)
 }

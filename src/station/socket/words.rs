@@ -1,78 +1,78 @@
-//! In: a line as a robot's program writes it. Out: what it asks for, or what is wrong with it; answers as lines. Pure.
-//! Frame and unit: the numbers of a pose as its notation has them.
+//! In: a line from a robot's program. Out: its request, or the error in it; answers as lines. Pure.
+//! Frame and unit: the numbers of a pose in its notation.
 
 use crate::geometry::{Frame, Rigid};
 use crate::robot::Convention;
 
-/// Bytes of a request, its end left out; controllers' own strings are shorter.
+/// Most bytes of a request without its line end; controllers' own strings are shorter.
 pub const MOST_BYTES: usize = 512;
-/// Characters of an answer: FANUC's and Denso's strings end soon after. A matrix in full is longer.
+/// Most characters of an answer: FANUC's and Denso's strings are hardly longer. A full matrix is longer.
 const MOST_WORDS: usize = 200;
 
-/// What a robot's program asks for.
+/// A request of a robot's program.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Request {
-    /// Who answers, and in which notation.
+    /// Asks for program and notation.
     Hello,
-    /// What was done so far.
+    /// Asks for the state of the session.
     Status,
-    /// A scan begins; what was found before is forgotten.
+    /// Begins a scan; an earlier result is discarded.
     Scan,
-    /// The flange stands there, the line is on: take the picture.
+    /// The flange stands at this pose and the line is on: take the picture.
     Pose(Vec<f64>),
-    /// The scan is complete: look for the part of that recipe.
+    /// The scan is complete: find the part of that recipe.
     Find(String),
-    /// A pose of the part that was found.
+    /// Asks for a pose of the found part.
     Give(Which, Of),
-    /// The connection ends.
+    /// Ends the connection.
     Bye,
 }
 
 /// Which pose of an insertion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Which {
-    /// Above it.
+    /// Above the insertion pose.
     Approach,
-    /// Down.
+    /// The insertion pose itself.
     Insertion,
-    /// Back up.
+    /// Back above it.
     Retract,
 }
 
-/// Of what a pose is.
+/// What a pose belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Of {
-    /// The inserting tool, which the controller has selected.
+    /// The inserting tool that the controller has selected.
     Tool,
     /// The flange: tool 0.
     Flange,
 }
 
-/// Why a request is not done; the numbers stand in the answer.
+/// Why a request is not executed; the answer contains the number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Code {
-    /// No such word.
+    /// Unknown word.
     Word = 1,
-    /// Numbers that are no pose.
+    /// Numbers that are not a pose.
     Numbers = 2,
-    /// Not at this time: no scan was begun, nothing was found.
+    /// Not possible now: no scan was begun, or nothing was found.
     Order = 3,
     /// The part was not found, or not well enough.
     Refused = 4,
-    /// No picture, or the disk is full: something on our side.
+    /// A fault on our side, for example no picture or a full disk.
     Failed = 5,
     /// Another robot is connected.
     Busy = 6,
-    /// A line without end.
+    /// A line that is too long.
     Long = 7,
-    /// Nothing came for too long.
+    /// Nothing was received for too long.
     Late = 8,
 }
 
-/// What is wrong.
+/// An error in a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wrong {
-    /// Its number.
+    /// Its code.
     pub code: Code,
     /// In words.
     pub words: String,
@@ -85,11 +85,11 @@ impl Wrong {
     }
 }
 
-/// Reads a request. Words may be in small letters; what parts numbers may be blanks, commas, semicolons or the
+/// Reads a request. Words may be in lower case. Numbers may be separated by blanks, commas, semicolons or the
 /// brackets that UR and ABB write around their poses (`p[0.1, ...]`, `[1,2,3],[...]`).
 ///
 /// # Errors
-/// What is wrong, in a few words.
+/// The error in a few words.
 pub fn read(line: &str) -> Result<Request, Wrong> {
     let line = line.trim();
     let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
@@ -124,7 +124,7 @@ fn numbers(text: &str) -> Result<Vec<f64>, Wrong> {
     text.split(parts).filter(|w| !w.is_empty()).map(read).collect()
 }
 
-/// A recipe's name becomes the name of a file: letters, digits, - and _ alone.
+/// A recipe's name becomes a file name: letters, digits, - and _ only.
 fn recipe(name: &str) -> Result<String, Wrong> {
     let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
     if (1..=40).contains(&name.len()) && name.chars().all(plain) {
@@ -157,17 +157,17 @@ fn give(rest: &str) -> Result<Request, Wrong> {
     }
 }
 
-/// Something that came over the wire, as far as it can be shown.
+/// Received text in printable form, cut to 24 characters.
 fn shown(text: &str) -> String {
     text.chars().take(24).map(|c| if c.is_ascii_graphic() || c == ' ' { c } else { '?' }).collect()
 }
 
-/// An answer that says yes, without its end.
+/// A positive answer, without its line end.
 pub fn yes(words: &str) -> String {
     format!("OK {words}").trim_end().to_owned()
 }
 
-/// An answer that says no: one line of plain characters.
+/// A negative answer: one line of plain characters.
 pub fn no(wrong: &Wrong) -> String {
     let plain = wrong.words.chars().map(|c| if c.is_ascii_graphic() || c == ' ' { c } else { '?' });
     format!("ERROR {} {}", wrong.code as u8, plain.take(MOST_WORDS).collect::<String>()).trim_end().to_owned()
@@ -179,12 +179,12 @@ pub fn pose<To: Frame, From: Frame>(convention: Convention, pose: &Rigid<To, Fro
         Some("mm") => 4,
         Some("deg") => 5,
         Some("m" | "rad") => 7,
-        // A pose of ABB fits into one of its strings, 80 characters.
+        // Six digits: a pose of ABB then fits into one of its strings of 80 characters.
         _ => 6,
     };
     let one = |(label, x): (&&str, f64)| {
         let digits = digits(label);
-        // -0.0000 surprises programs that compare texts.
+        // -0.0000 would surprise programs that compare texts.
         format!("{:.digits$}", if x.abs() < 0.5 * 10f64.powi(-digits) { 0.0 } else { x }, digits = digits as usize)
     };
     convention.labels().iter().zip(convention.write(pose)).map(one).collect::<Vec<_>>().join(" ")

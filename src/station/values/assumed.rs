@@ -1,4 +1,4 @@
-//! How well imported values are known: as whoever imports them states, else as such calibrations usually are. Standard
+//! Uncertainty of imported values: as stated at the import, else as usual for such calibrations. Standard
 //! deviations in mm, degrees and px.
 
 use crate::camera::{ALWAYS_NAMED, NAMES};
@@ -7,23 +7,25 @@ use crate::geometry::{Camera, Mat3, Plane, Vec3};
 use crate::rig::{Covariance, Kind};
 use nalgebra::{DMatrix, DVector};
 
-/// Standard deviations that were stated; what is `None` has its usual value. Nothing counts as exact: two looks at a
-/// right part would contradict each other by what robot and calibrations are off by.
+/// Stated standard deviations; `None` takes the usual value. No value counts as exact: otherwise two scans of the
+/// right part would contradict each other through the errors of robot and calibrations.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sigmas {
-    /// Of the robot's place, each axis, mm; usually 0.02, the repeatability (ISO 9283) that makers state of such arms.
+    /// Sigma of the robot's position, each axis, mm; usually 0.02, the repeatability (ISO 9283) that makers state
+    /// for such arms.
     pub robot_mm: Option<f64>,
-    /// Of its turn, each axis, degrees; usually 0.004, which moves a tool 300 mm long by those 0.02 mm.
+    /// Sigma of its rotation, each axis, degrees; usually 0.004, which moves a tool 300 mm long by those 0.02 mm.
     pub robot_deg: Option<f64>,
-    /// Of a hand-eye's place, each axis, mm; usually 0.03: what 15 to 20 poses of a board leave, with a robot as above.
+    /// Sigma of a hand-eye's translation, each axis, mm; usually 0.03: typical of 15 to 20 board poses with a robot
+    /// as above.
     pub hand_eye_mm: Option<f64>,
-    /// Of its turn, each axis, degrees; usually 0.006: those 0.03 mm seen at 300 mm.
+    /// Sigma of its rotation, each axis, degrees; usually 0.006: those 0.03 mm seen at 300 mm.
     pub hand_eye_deg: Option<f64>,
-    /// Of a laser plane's distance where it is used, mm; usually 0.02: a tenth of a stripe's width of 0.2 mm.
+    /// Sigma of a laser plane's distance where it is used, mm; usually 0.02: a tenth of a stripe's width of 0.2 mm.
     pub plane_mm: Option<f64>,
-    /// Of its tilt, degrees; usually 0.006: 0.02 mm over boards that were shown within 200 mm.
+    /// Sigma of its tilt, degrees; usually 0.006: 0.02 mm over boards that were shown within 200 mm.
     pub plane_deg: Option<f64>,
-    /// Of focal lengths and principal point, px; usually 0.5: rays that are known less well make no usable camera.
+    /// Sigma of focal lengths and principal point, px; usually 0.5: with larger ones a camera is not usable.
     pub camera_px: Option<f64>,
 }
 
@@ -41,14 +43,14 @@ fn sigma(stated: Option<f64>, usual: f64, unit: &'static str) -> Sigma {
     Sigma { value: stated.unwrap_or(usual), unit, stated: stated.is_some() }
 }
 
-/// A covariance with what reports have to say of it.
+/// A covariance with its remarks for reports.
 pub(super) struct Assumed {
     pub covariance: Covariance,
     pub remarks: Vec<String>,
 }
 
 impl Sigmas {
-    /// Refuses what is no standard deviation of a rig.
+    /// Refuses values that cannot be a rig's standard deviation.
     pub fn check(&self) -> Result<()> {
         let all = [
             ("robot", self.robot_mm, MM),
@@ -70,13 +72,13 @@ impl Sigmas {
         }
     }
 
-    /// Of the robot's poses, mm and degrees, and the remark.
+    /// Sigmas of the robot's poses, mm and degrees, and the remark.
     pub(super) fn robot(&self) -> ([f64; 2], String) {
         let both = [sigma(self.robot_mm, 0.02, MM), sigma(self.robot_deg, 0.004, DEGREES)];
         ([both[0].value, both[1].value], said("the robot's poses scatter", &both))
     }
 
-    /// Of a camera on a flange or in a base frame.
+    /// Covariance of a camera's pose on a flange or in a base frame.
     pub(super) fn pose(&self) -> Assumed {
         let both = [sigma(self.hand_eye_mm, 0.03, MM), sigma(self.hand_eye_deg, 0.006, DEGREES)];
         let (t, w) = (both[0].value.powi(2), both[1].value.to_radians().powi(2));
@@ -85,12 +87,12 @@ impl Sigmas {
         Assumed { covariance, remarks: vec![said("it is off", &both)] }
     }
 
-    /// Of a plane that turns about the place where the camera's axis meets it.
+    /// Covariance of a plane that tilts about the point where the camera's axis meets it.
     pub(super) fn plane(&self, plane: &Plane<Camera>) -> Assumed {
         let both = [sigma(self.plane_mm, 0.02, MM), sigma(self.plane_deg, 0.006, DEGREES)];
         let n = plane.normal;
         let ahead = plane.offset / n.z;
-        // A sheet that runs along the camera's axis is met nowhere that matters.
+        // A sheet nearly parallel to the camera's axis meets it outside the usable range.
         let pivot = if ahead > 0.0 && ahead < FARTHEST { Vec3::new(0.0, 0.0, ahead) } else { n * plane.offset };
         let tilt = (Mat3::identity() - n * n.transpose()) * both[1].value.to_radians();
         let mut root = DMatrix::zeros(4, 4);
@@ -101,7 +103,7 @@ impl Sigmas {
         Assumed { covariance, remarks: vec![said("it is off", &both)] }
     }
 
-    /// Of a camera; its lens terms count as known.
+    /// Covariance of a camera; its lens terms count as known.
     pub(super) fn camera(&self) -> Assumed {
         let px = sigma(self.camera_px, 0.5, "px");
         let mut matrix = DMatrix::zeros(ALWAYS_NAMED, ALWAYS_NAMED);
@@ -114,10 +116,10 @@ impl Sigmas {
 
 /// Largest sigma that a calibration may have, mm, degrees or px.
 const MOST: f64 = 10.0;
-/// A camera on an arm works nearer than this, mm.
+/// Largest working distance of a camera on an arm, mm.
 const FARTHEST: f64 = 5000.0;
 
-/// What every report says of it.
+/// The remark that every report contains.
 fn said(what: &str, sigmas: &[Sigma]) -> String {
     let each: Vec<String> = sigmas.iter().map(|s| format!("{} {}", s.value, s.unit)).collect();
     let whose = match (sigmas.iter().all(|s| s.stated), sigmas.iter().any(|s| s.stated)) {
@@ -143,7 +145,7 @@ mod tests {
         let c = usual.plane(&plane).covariance;
         c.check(Kind::LaserPlane).unwrap();
         usual.camera().covariance.check(Kind::Camera).unwrap();
-        // Where the camera's axis meets the plane its depth is known to the offset's own sigma, whatever the tilt.
+        // Where the camera's axis meets the plane, the depth has the offset's own sigma, whatever the tilt.
         let at = DVector::from_vec(vec![0.0, 0.0, -250.0, 1.0]);
         assert!(((&c.to_matrix() * &at).dot(&at).sqrt() - 0.02).abs() < 1e-9);
         let stated = Sigmas { plane_mm: Some(0.1), plane_deg: Some(0.02), hand_eye_mm: Some(0.2), ..usual };

@@ -1,5 +1,5 @@
-//! In: known values of a rig (a data sheet, another program, a truth file). Out: calibration files;
-//! and the other way round, for programs that compare.
+//! In: known values of a rig (a data sheet, another program, a truth file). Out: calibration files. Also writes the
+//! values of a rig for programs that compare them.
 //! Frame and unit: keys as in the reference data's format: `flange_T_camera`, mm, row-major.
 
 use super::assumed::{Assumed, Sigmas};
@@ -11,7 +11,7 @@ use crate::rig::{
 };
 use std::path::Path;
 
-/// The values of a rig as one JSON object; every entry may be missing, other keys are left alone.
+/// The values of a rig as one JSON object; every entry may be missing, other keys are ignored.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Values {
     /// Pinhole camera with lens; px.
@@ -20,13 +20,13 @@ pub struct Values {
     /// Hand-eye transform, 4 x 4 row-major, mm.
     #[serde(rename = "flange_T_camera", default, skip_serializing_if = "Option::is_none")]
     pub flange_from_camera: Option<[f64; 16]>,
-    /// The sheet of light, camera frame, mm.
+    /// The laser sheet, camera frame, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub laser_plane_camera: Option<PlaneValue>,
     /// The pointer's beam, camera frame, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pointer_camera: Option<PointerValue>,
-    /// A camera that stands still before a robot.
+    /// Pose of a camera that stands still beside the robot, 4 x 4 row-major, mm.
     #[serde(rename = "base_T_camera", default, skip_serializing_if = "Option::is_none")]
     pub base_from_camera: Option<[f64; 16]>,
     /// A linear axis as a fixed camera sees it.
@@ -35,7 +35,8 @@ pub struct Values {
     /// A turntable as a fixed camera sees it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turntable: Option<Axis>,
-    /// Whose file it was, and by which conventions it was read; none of this program's own.
+    /// The program that wrote the file and the conventions by which it was read; `None` for this program's own
+    /// files.
     #[serde(skip)]
     pub read_as: Option<String>,
 }
@@ -45,7 +46,7 @@ pub struct Values {
 pub struct PlaneValue {
     /// Of unit length.
     pub normal: [f64; 3],
-    /// Along it, mm.
+    /// Distance along the normal, mm.
     pub offset_mm: f64,
 }
 
@@ -73,7 +74,7 @@ impl Values {
         })
     }
 
-    /// What a rig holds; what it lacks stays `None`.
+    /// The values that a rig holds; missing ones stay `None`.
     pub fn of(rig: &Rig) -> Values {
         Values {
             intrinsics: rig.camera.as_ref().map(|c| c.value),
@@ -93,9 +94,9 @@ impl Values {
         }
     }
 
-    /// Makes each value a calibration, naming `source` as its input, and stores all of them or none. Camera, laser
-    /// plane and the camera's place have the covariance that `sigmas` says, others an unknown one. What looks like
-    /// another unit is refused unless it is so `as_stated`. Returns what was stored.
+    /// Makes each value a calibration, with `source` as its input, and stores all of them or none. Camera, laser
+    /// plane and the camera's pose get the covariance of `sigmas`, others an unknown one. Values that look like
+    /// another unit are refused unless `as_stated` is set. Returns the kinds that were stored.
     pub fn store(&self, station: &Path, source: &Path, as_stated: bool, sigmas: &Sigmas) -> Result<Vec<Kind>> {
         sigmas.check()?;
         let camera = self
@@ -104,7 +105,7 @@ impl Values {
                 Ok::<_, Fault>(known(imported(Kind::Camera, c, None, self.read_as.clone(), source)?, sigmas.camera()))
             })
             .transpose()?;
-        // What comes without a camera belongs to the one that the station has.
+        // Values without a camera belong to the station's camera.
         let theirs = if camera.is_none() { Rig::load_camera(station)?.camera } else { None };
         let with = camera.as_ref().or(theirs.as_ref());
         let plane = self.laser_plane_camera.as_ref().map(|p| {
@@ -172,10 +173,11 @@ fn no_length(key: &str) -> Fault {
     Fault::input(format!("{key} has no length")).cause("all zeros").next("give a direction")
 }
 
-/// A direction of four decimals is this far from unit length at most; beyond it is unclear what the other numbers mean.
+/// Largest deviation from unit length of a direction with four decimals; beyond it the meaning of the other numbers
+/// is unclear.
 const ROUNDED: f64 = 5e-4;
 
-/// A direction that is made one unit long, and what is to be said of it.
+/// The direction scaled to unit length, and a remark if that changed it.
 fn unit(key: &str, v: [f64; 3]) -> Result<(Vec3, Option<String>)> {
     let v = Vec3::from(v);
     let length = v.norm();
@@ -185,7 +187,7 @@ fn unit(key: &str, v: [f64; 3]) -> Result<(Vec3, Option<String>)> {
             .next("give a direction of unit length, and the plane's offset along it"));
     }
     let note = ((length - 1.0).abs() > 1e-6).then(|| format!("{key} was {length:.6} long and is taken as a direction"));
-    // The offset stays: it is measured along the direction, whose digits were rounded.
+    // The offset is not scaled: it is measured along the direction, whose digits were rounded.
     Ok((v / length, note))
 }
 
@@ -207,7 +209,7 @@ fn imported<T: serde::Serialize>(
     Calibration::new(kind, value, with, Covariance::default(), quality).with_input(source)
 }
 
-/// The same, known as well as `assumed` says.
+/// The same calibration with the covariance and remarks of `assumed`.
 fn known<T>(mut calibration: Calibration<T>, assumed: Assumed) -> Calibration<T> {
     calibration.covariance = assumed.covariance;
     calibration.remarks = assumed.remarks;

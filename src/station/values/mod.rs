@@ -1,4 +1,4 @@
-//! Values of a rig that come from elsewhere, or go there, and how well they are taken to be known.
+//! Import and export of a rig's values, and the uncertainty that is assumed for them.
 
 mod assumed;
 mod exchange;

@@ -1,7 +1,7 @@
-//! In: a robot behind its rules, a camera with its lights, somebody who confirms. Out: the cell that a calibration
+//! In: a robot behind its rules, a camera with its lights, a person who confirms. Out: the cell that a calibration
 //! drives.
-//! Frame and unit: base_from_flange, mm, mm/s. Every move is shown and confirmed; what the rules do not allow is not
-//! made.
+//! Frame and unit: base_from_flange, mm, mm/s. Every move is shown and confirmed; moves that the rules do not allow
+//! are not made.
 
 use super::cell::{Cell, Light, Went};
 use crate::arm::rules::{Confirmation, Guard, Limits, Plan, Proposal, Straight};
@@ -16,14 +16,14 @@ use crate::station::job::eye::Eye;
 use crate::station::job::{Ask, Operator};
 use std::time::Duration;
 
-/// An arm and its camera swing for a moment after they have arrived.
+/// Waiting time after a move, while arm and camera still swing.
 const SETTLE: Duration = Duration::from_millis(200);
-/// Legs stay a little below the rules' longest step and widest turn.
+/// Share of the rules' longest step and widest turn that a leg uses at most.
 const BELOW: f64 = 0.95;
-/// Places on a straight way at which the controller is asked whether it reaches them.
+/// Number of poses along a straight path for which the controller is asked about reach.
 const ASKED: usize = 4;
 
-/// A real cell, or one that is simulated at its wires.
+/// A real cell, or one that is simulated at its network interfaces.
 pub struct ArmCell<'a> {
     guard: &'a mut Guard,
     eye: Eye,
@@ -33,7 +33,7 @@ pub struct ArmCell<'a> {
 }
 
 impl<'a> ArmCell<'a> {
-    /// `guard` is armed; `speed_mm_s` as asked for, the rules' own limit holds besides.
+    /// `guard` is armed; `speed_mm_s` is the requested speed, which the rules' own limit also bounds.
     ///
     /// # Errors
     /// The outputs cannot be switched.
@@ -56,7 +56,7 @@ impl<'a> ArmCell<'a> {
         })
     }
 
-    /// Proposes until somebody has said yes or no.
+    /// Proposes until a person has answered yes or no.
     fn agreed(&mut self, plan: Plan, to: &Rigid<Base, Flange>) -> Result<(Proposal, Confirmation)> {
         let t = to.translation;
         let says = vec![format!("stop {}: flange to {:.1} {:.1} {:.1} mm", self.stops, t.x, t.y, t.z)];
@@ -80,7 +80,7 @@ impl<'a> ArmCell<'a> {
     }
 }
 
-/// A straight way in steps that keep the rules.
+/// Divides a straight path into legs that meet the rules.
 fn legs(way: &Straight, limits: &Limits, speed_mm_s: f64) -> Vec<Motion> {
     let steps = way.shift.norm() / (BELOW * limits.max_step_mm);
     let turns = way.turn.norm().to_degrees() / (BELOW * limits.max_turn_deg);
@@ -100,7 +100,7 @@ impl Cell for ArmCell<'_> {
             return Ok(false);
         }
         let way = Straight::new(&from, to);
-        // What is reached at its end may be out of reach on the way there.
+        // The end may be within reach although the path to it is not.
         for k in (1..=ASKED).rev() {
             if matches!(self.guard.link().reach(&way.at(k as f64 / ASKED as f64))?, Reach::Refused(_)) {
                 return Ok(false);
@@ -136,7 +136,7 @@ impl Cell for ArmCell<'_> {
             Light::Line => Some(Beam::Line),
             Light::Pointer => Some(Beam::Pointer),
         };
-        // A laser is on for its picture alone: between two stops somebody is asked, and may think about it.
+        // A laser is on only for its picture: between two stops a person is asked, and may take time.
         let picture = self.eye.picture(beam);
         self.eye.lights.after(picture)
     }

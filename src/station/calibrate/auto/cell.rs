@@ -1,11 +1,11 @@
-//! What a calibration that drives itself asks of the cell that it drives; poses are base_from_flange, mm.
+//! What an automatic calibration requires of its cell; poses are base_from_flange, mm.
 
 use crate::camera::Readout;
 use crate::fault::Result;
 use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::Image;
 
-/// What is on while a picture is taken.
+/// The light during a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Light {
     /// The room's light alone.
@@ -16,26 +16,26 @@ pub enum Light {
     Pointer,
 }
 
-/// What came of a move.
+/// The outcome of a move.
 #[derive(Clone, Debug)]
 pub enum Went {
-    /// It stands there; where it says that it stands.
+    /// The robot has arrived; its reported pose.
     There(Rigid<Base, Flange>),
-    /// It was refused before it began, in these words: the robot stands where it stood.
+    /// The move was refused before it began, with the reason: the robot has not moved.
     NotBegun(String),
 }
 
-/// A robot with the sensor on its flange. Who implements it keeps the motion rules: a move that they do not allow is
-/// not made.
+/// A robot with the sensor on its flange. The implementation enforces the motion rules: moves that they do not
+/// allow are not made.
 pub trait Cell {
-    /// Where the robot says that it stands.
+    /// The robot's reported pose.
     fn pose(&mut self) -> Result<Rigid<Base, Flange>>;
-    /// Whether it may and can go there: reach, box, keep-outs. Nothing moves.
+    /// Whether the robot may and can go there: reach, box, keep-outs. Nothing moves.
     fn may(&mut self, to: &Rigid<Base, Flange>) -> Result<bool>;
     /// Goes there, and waits until it stands still.
     fn go(&mut self, to: &Rigid<Base, Flange>) -> Result<Went>;
-    /// How its pictures are read from the sensor; none where the camera does not say.
+    /// The readout of its pictures from the sensor; `None` if the camera does not report it.
     fn readout(&self) -> Option<Readout>;
-    /// Takes one picture where it stands.
+    /// Takes one picture at the present pose.
     fn picture(&mut self, light: Light) -> Result<Image>;
 }

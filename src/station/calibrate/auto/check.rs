@@ -1,4 +1,4 @@
-//! In: a calibration, stops that it did not see. Out: how far points that it scans there lie from where the board is.
+//! In: a calibration, stops that it did not use. Out: the distance of points scanned there from the board.
 //! Frame and unit: mm.
 
 use crate::calibrate::hand_eye::options::Mount;
@@ -7,21 +7,21 @@ use crate::calibrate::joint::solve::JointFit;
 use crate::calibrate::joint::volume::scanned;
 use crate::geometry::{Vec2, Vec3};
 
-/// What stops that no solve saw say of a calibration.
+/// Check of a calibration with stops that no solve used.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct SelfCheck {
-    /// How many stops.
+    /// Number of stops.
     pub stops: usize,
-    /// How many points of the stripe.
+    /// Number of points of the stripe.
     pub points: usize,
     /// Distance of scanned points from the board's plane, mm rms.
     pub off_mm: f64,
-    /// What calibration and robot together are expected to make of it, mm rms.
+    /// The expected distance from calibration and robot together, mm rms.
     pub expected_mm: f64,
 }
 
-/// Of stops whose stripe lies on the board at place 0; `calibration_mm` is the expected error of a scanned point.
-/// `None` where no stop shows a stripe.
+/// Checks stops whose stripe lies on the board at place 0; `calibration_mm` is the expected error of a scanned
+/// point. `None` if no stop shows a stripe.
 pub fn check(fit: &JointFit, mount: Mount, shots: &[Shot], calibration_mm: f64) -> Option<SelfCheck> {
     let (mut squares, mut expected, mut points, mut stops) = (0.0, 0.0, 0usize, 0usize);
     let place = fit.state.far_from_board.first()?;
@@ -44,7 +44,8 @@ pub fn check(fit: &JointFit, mount: Mount, shots: &[Shot], calibration_mm: f64) 
                 continue;
             };
             let peak = (right - z).hypot(below - z) * p.sigma_px * fit.noise.stripe;
-            // The flange's turn moves the point against the board by its lever: how far it lies from the flange.
+            // The flange's rotation error moves the point relative to the board by its lever, the distance from the
+            // flange.
             let lever = scanned(&fit.state, &p.pixel).map_or(0.0, |p| from_flange(&p)) * fit.noise.robot_rad;
             squares += z * z;
             expected += calibration_mm.powi(2) / 3.0 + fit.noise.robot_mm.powi(2) + lever.powi(2) + peak.powi(2);

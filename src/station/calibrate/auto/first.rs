@@ -1,5 +1,5 @@
-//! In: a robot that sees a board. Out: small moves that keep it in view, and a first camera with its hand-eye
-//! transform from what the robot says of them.
+//! In: a robot that sees a board. Out: small moves that keep the board in view, and from them a first camera with
+//! its hand-eye transform.
 //! Frame and unit: flange, mm, degrees; px.
 
 use super::cell::{Cell, Went};
@@ -27,12 +27,12 @@ const MOVES: [[f64; 6]; 9] = [
 ];
 const TURN_DEG: f64 = 6.0;
 const SHIFT_MM: f64 = 12.0;
-/// A move after which the board is not in view is tried again half as far, so often.
+/// How often a move after which the board is not in view is repeated with half the distance.
 const HALVINGS: usize = 3;
-/// Fewest stops of the first moves; the camera's focal length and the hand-eye transform come from these.
+/// Fewest stops of the first moves, which determine the camera's focal length and the hand-eye transform.
 const FEWEST: usize = 7;
 
-/// Moves about `home` and takes pictures; returns to it in the end.
+/// Moves about `home` and takes pictures; finally returns to it.
 pub fn moves(cell: &mut dyn Cell, home: &Rigid<Base, Flange>, book: &mut Notebook) -> Result<()> {
     let mut why = String::new();
     for m in MOVES {
@@ -59,7 +59,7 @@ pub fn moves(cell: &mut dyn Cell, home: &Rigid<Base, Flange>, book: &mut Noteboo
             why = reason;
         }
     }
-    // Where that is refused the arm goes on from where it stands.
+    // If the return is refused, the procedure continues from the arm's present pose.
     let _ = cell.go(home)?;
     if book.stops.len() < FEWEST {
         return Err(Fault::refused(format!(
@@ -76,12 +76,13 @@ pub fn moves(cell: &mut dyn Cell, home: &Rigid<Base, Flange>, book: &mut Noteboo
     Ok(())
 }
 
-/// Focal lengths that are tried, as shares of the picture's longer side, each 8 % longer than the one before.
+/// Range of trial focal lengths: the shortest as a share of the picture's longer side, and the number of steps of 8
+/// %.
 const SHORTEST: f64 = 0.5;
 const STEPS: i32 = 45;
 
-/// The pinhole camera with which the robot's moves and the board's agree best. A focal length that is wrong puts the
-/// board at a wrong distance, and the robot's shifts say so.
+/// The pinhole camera for which the robot's moves and the board's agree best. A wrong focal length puts the board
+/// at a wrong distance, which contradicts the robot's shifts.
 pub fn camera(stops: &[Stop], mount: Mount, size: [u32; 2]) -> Result<Intrinsics> {
     let [width, height] = size;
     let long = f64::from(width.max(height));
@@ -94,7 +95,7 @@ pub fn camera(stops: &[Stop], mount: Mount, size: [u32; 2]) -> Result<Intrinsics
             Some(Pair::new(mount.near_from_far(&s.robot?.pose), seen))
         };
         let pairs: Vec<Pair> = stops.iter().filter_map(pair).collect();
-        // In px: a camera that puts the board far away must not be preferred for its millimetres.
+        // In px: otherwise a camera that puts the board far away would be preferred for its smaller millimetres.
         let depth = pairs.iter().map(|p| p.seen.centre().z).sum::<f64>() / pairs.len().max(1) as f64;
         agree(&pairs, 1).filter(|a| a.agreeing.len() * 3 >= pairs.len() * 2).map(|a| a.spread * k.fx / depth)
     };
@@ -123,8 +124,8 @@ pub fn camera(stops: &[Stop], mount: Mount, size: [u32; 2]) -> Result<Intrinsics
         })
 }
 
-/// What is known of any camera beforehand, so that few pictures do not run away: a principal point near the middle, a
-/// lens that bends moderately.
+/// Prior of any camera, which keeps a solve from few pictures from diverging: a principal point near the middle and
+/// a moderate distortion.
 pub fn usual(k: &Intrinsics) -> CameraCovariance {
     let (w, h) = (f64::from(k.width), f64::from(k.height));
     let sigmas = [0.2 * k.fx, 0.2 * k.fx, 0.05 * w, 0.05 * h, 0.3, 0.5, 0.005, 0.005, 0.5];

@@ -1,5 +1,5 @@
-//! In: a robot and a camera with lasers, one board that lies below them. Out: the whole rig, calibrated by moves that
-//! the program chooses: small first ones, then each the one that lowers the expected error most.
+//! In: a robot and a camera with lasers, one board below them. Out: the whole rig, calibrated by moves that the
+//! program chooses: first small ones, then each time the one that lowers the expected error most.
 //! Frame and unit: mm, rad, px; each file names its frames.
 
 pub(in crate::station) mod arm;

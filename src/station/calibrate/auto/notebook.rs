@@ -1,5 +1,5 @@
 //! In: stops, one after another. Out: two recordings of them (the stripe, the pointer's spot; the pictures in room
-//! light are the same), whole after every stop, so that `calibrate joint` comes to the same.
+//! light are the same). They are complete after every stop, so that `calibrate joint` gives the same result.
 //! Frame and unit: base_from_flange, mm; px.
 
 use super::cell::{Cell, Light};
@@ -13,7 +13,7 @@ use crate::recording::{Beam, BoardSpec, FrameRef, ImageSpec, Meta, Recording, sa
 use crate::station::calibrate::joint::gather::{Picture, Stop};
 use std::path::{Path, PathBuf};
 
-/// The recordings so far.
+/// The recordings of the stops so far.
 pub struct Notebook {
     folder: PathBuf,
     board: BoardSpec,
@@ -21,7 +21,7 @@ pub struct Notebook {
     poses: Vec<Rigid<Base, Flange>>,
     /// Every stop, in order.
     pub stops: Vec<Stop>,
-    /// Poses at which pictures were taken, the board found or not.
+    /// Number of poses at which pictures were taken, whether or not the board was found.
     pub visits: usize,
 }
 
@@ -29,7 +29,7 @@ pub struct Notebook {
 const NAMES: [(&str, Beam); 2] = [("line", Beam::Line), ("pointer", Beam::Pointer)];
 
 impl Notebook {
-    /// An empty one; its folder must be new or empty, so that no other recording is overwritten.
+    /// An empty notebook; its folder must be new or empty, so that no other recording is overwritten.
     pub fn new(folder: &Path, board: &BoardSpec) -> Result<Notebook> {
         let taken = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
         if taken {
@@ -50,8 +50,8 @@ impl Notebook {
         })
     }
 
-    /// Takes the pictures where the robot stands. `None` where the whole board is not found: nothing is kept, the
-    /// reason is in the second place.
+    /// Takes the pictures at the robot's present pose. `None` if the whole board is not found: then nothing is
+    /// stored, and the second value is the reason.
     pub fn stop(&mut self, cell: &mut dyn Cell, pose: &Rigid<Base, Flange>) -> Result<(Option<usize>, String)> {
         let room = cell.picture(Light::Room)?;
         self.visits += 1;
@@ -149,7 +149,7 @@ impl Notebook {
         Ok(())
     }
 
-    /// Both recordings as they are now.
+    /// Both recordings in their present state.
     pub fn recordings(&self) -> Vec<Recording> {
         let open = |(name, beam): (&str, Beam)| {
             let folder = self.folder.join(name);

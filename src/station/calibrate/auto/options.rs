@@ -1,4 +1,4 @@
-//! In: nothing. Out: how a rig is calibrated by moves of the program's choice, within which limits.
+//! In: nothing. Out: options and limits of a calibration whose moves the program chooses.
 //! Frame and unit: mm.
 
 use super::super::joint::run::JointRun;
@@ -6,7 +6,7 @@ use crate::fault::{Fault, Result};
 use crate::recording::BoardSpec;
 use std::path::PathBuf;
 
-/// How [`super::procedure::calibrate_auto`] is run.
+/// Options of [`super::procedure::calibrate_auto`].
 #[derive(Clone, Debug)]
 pub struct AutoRun {
     /// How pictures are measured and the result is judged.
@@ -15,22 +15,22 @@ pub struct AutoRun {
     pub board: BoardSpec,
     /// Where the recordings go: a folder that is new or empty.
     pub out: PathBuf,
-    /// Expected error of a scanned point at which it is enough, mm rms; above 0.
+    /// Target of the expected error of a scanned point, mm rms; above 0.
     pub target_mm: f64,
-    /// Poses at which pictures are taken at most, those of the check and those from which the board is not found
-    /// included; 20..=200.
+    /// Most poses at which pictures are taken, including those of the check and those without a found board;
+    /// 20..=200.
     pub most: usize,
-    /// Depths between which points will be scanned, mm; where nobody states them a fifth to both sides of the board
-    /// as it is first seen.
+    /// Depths between which points will be scanned, mm. `None`: from a fifth below to a fifth above the first depth
+    /// of the board.
     pub working: Option<[f64; 2]>,
-    /// Poses among which each next one is chosen; 20..=2000.
+    /// Number of poses among which each next one is chosen; 20..=2000.
     pub candidates: usize,
-    /// Same seed, same poses.
+    /// Seed of the random poses: the same seed gives the same poses.
     pub seed: u64,
 }
 
 impl AutoRun {
-    /// Refuses values out of the ranges that the fields state.
+    /// Refuses values outside the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         self.joint.asked.check()?;
         let ranges = [

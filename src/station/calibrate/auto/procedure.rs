@@ -1,5 +1,5 @@
-//! In: a cell, a board below its robot or on its flange, a target. Out: the rig, calibrated by moves of the program's
-//! own choice, checked on poses that no solve saw.
+//! In: a cell, a board below its robot or on its flange, a target. Out: the rig, calibrated by moves that the
+//! program chooses, and checked on poses that no solve used.
 //! Frame and unit: mm, rad, px (docs/math.md, Joint calibration (9), (10)).
 
 use super::super::joint::measure::{Finders, unjudged};
@@ -26,23 +26,24 @@ use crate::geometry::{Base, Board, Camera, Flange, Rigid};
 use crate::recording::BoardSpec;
 use crate::rig::Rig;
 
-/// Stops that no solve sees.
+/// Number of stops for the check, which no solve uses.
 const CHECKS: usize = 5;
-/// So often poses are drawn for these: some are refused, from some the board is not found.
+/// How often poses for the check are drawn: some are refused, and from some the board is not found.
 const CHECK_ROUNDS: usize = 3;
-/// Fewest stops that are believed, whatever they promise: as few tell the robot's scatter badly.
+/// Fewest stops before the expected error is trusted: fewer determine the robot's scatter badly.
 const FEWEST: usize = 14;
-/// So many predictions in a row that are wrong are no accident.
+/// Number of wrong predictions in a row that ends the calibration with a fault.
 const LOST: usize = 8;
-/// A move to a pose this near to one that the controller would not begin is not asked for again: share of the board's
-/// distance, and degrees.
+/// Poses this near to one that the controller refused are not requested again: share of the board's distance, and
+/// degrees.
 const NEAR: (f64, f64) = (0.15, 12.0);
-/// After so many refusals in a row the arm goes back to where it began, and after so many it is given up.
+/// Number of refusals in a row after which the arm returns to its first pose, and after which the calibration
+/// fails.
 const BACK: usize = 3;
 const STUCK: usize = 12;
-/// Poses that are tried until stripes tell where the sheet is.
+/// Most poses that are tried until stripes determine the sheet.
 const LIGHTS: usize = 10;
-/// It does not fall any more where so many stops have gained less than 2 %.
+/// The calibration has stalled if this many stops have gained less than 2 %.
 const STALLED: usize = 8;
 
 /// The state between two stops.
@@ -55,24 +56,24 @@ struct Session<'a> {
     shots: Vec<Shot>,
     fit: JointFit,
     working: [f64; 2],
-    /// Largest tilt that is asked for, degrees: it grows while the predictions come true.
+    /// Largest tilt that is requested, degrees: it grows while the predictions are right.
     tilt_deg: f64,
     tries: u64,
-    /// Stops in a row at which the board was not found where it was predicted.
+    /// Number of stops in a row at which the board was not found where it was predicted.
     lost: usize,
-    /// Where the arm has been, the beginning first.
+    /// Poses that the arm came by, the first pose first.
     trail: Vec<Rigid<Base, Flange>>,
-    /// Where the controller would not begin to go, and how many of these came one after the other.
+    /// Poses to which the controller refused to go, and the number of refusals in a row.
     refused: Vec<Rigid<Base, Flange>>,
     stuck: usize,
 }
 
-/// Calibrates camera, hand-eye, laser plane and pointer by itself. `told` hears of every stop: how many, and the
-/// error that is expected then.
+/// Calibrates camera, hand-eye, laser plane and pointer automatically. `told` receives the number of stops and the
+/// expected error after each stop.
 ///
 /// # Errors
-/// The board is not in the first picture, leaves the view with small moves, or moves; nothing explains what was seen;
-/// a move or a picture fails.
+/// The board is not in the first picture, leaves the view with small moves, or moves; no model fits the
+/// measurements; a move or a picture fails.
 pub fn calibrate_auto(cell: &mut dyn Cell, rig: &Rig, run: &AutoRun, told: &dyn Fn(usize, f64)) -> Result<AutoResult> {
     run.check()?;
     let mut session = Session::begin(cell, rig, run)?;
@@ -94,7 +95,7 @@ pub fn calibrate_auto(cell: &mut dyn Cell, rig: &Rig, run: &AutoRun, told: &dyn 
     let stops = session.shots.len();
     let joint = calibrate_joint(&session.book.recordings(), rig, &run.joint, &|_, _| {})?;
     let check = session.check(&joint)?;
-    // What was calibrated stays so where the arm does not come back.
+    // The calibration remains valid if the arm does not return.
     let stranded = match session.home() {
         Ok(true) => None,
         Ok(false) => Some("none of the places that it came by is reached straight: jog it back joint by joint".into()),
@@ -106,7 +107,7 @@ pub fn calibrate_auto(cell: &mut dyn Cell, rig: &Rig, run: &AutoRun, told: &dyn 
 }
 
 impl<'a> Session<'a> {
-    /// The picture where it stands, the small moves, a first solve.
+    /// Takes the picture at the present pose, makes the small moves, and solves once.
     fn begin(cell: &'a mut dyn Cell, rig: &Rig, run: &'a AutoRun) -> Result<Session<'a>> {
         let mut book = Notebook::new(&run.out, &run.board)?;
         let home = cell.pose()?;
@@ -148,8 +149,8 @@ impl<'a> Session<'a> {
         Ok(session)
     }
 
-    /// From where it began the sheet may pass beside the board: poses within the working depths, until stripes tell
-    /// where it is.
+    /// Goes to poses within the working depths until stripes determine the sheet: from the first poses it may miss
+    /// the board.
     fn light(&mut self) -> Result<()> {
         for _ in 0..LIGHTS {
             if self.fit.has(Part::Stripe) {
@@ -192,7 +193,7 @@ impl<'a> Session<'a> {
             .then_some(Ended::Stalled)
     }
 
-    /// Boards as they could be seen next, from poses that may be gone to.
+    /// Possible next views of the board, from allowed poses.
     fn candidates(&mut self) -> Result<Vec<(Rigid<Camera, Board>, Rigid<Base, Flange>)>> {
         self.tries += 1;
         let state = &self.fit.state;
@@ -219,7 +220,7 @@ impl<'a> Session<'a> {
         Ok(out)
     }
 
-    /// Goes to the best of the poses and takes it in. False where there is none.
+    /// Goes to the best of the poses and adds its stop. False if there is no pose.
     fn next_stop(&mut self, belief: &Belief) -> Result<bool> {
         let all = self.candidates()?;
         let boards: Vec<Rigid<Camera, Board>> = all.iter().map(|c| c.0).collect();
@@ -228,7 +229,7 @@ impl<'a> Session<'a> {
             Visit::Seen(i) => i,
             Visit::NotBegun(why) => return self.elsewhere(all[choice.index].1, &why).map(|()| true),
             Visit::Lost(why) => {
-                // The prediction was wrong: nearer to what is known.
+                // The prediction was wrong: the next pose is chosen nearer to known ones.
                 self.tilt_deg = (0.7 * self.tilt_deg).max(8.0);
                 self.lost += 1;
                 return if self.lost < LOST { Ok(true) } else { Err(lost(&why)) };
@@ -241,7 +242,7 @@ impl<'a> Session<'a> {
         Ok(true)
     }
 
-    /// Goes there and takes the pictures.
+    /// Goes to a pose and takes the pictures.
     fn visit(&mut self, to: &Rigid<Base, Flange>) -> Result<Visit> {
         let reported = match self.cell.go(to)? {
             Went::There(reported) => reported,
@@ -252,8 +253,8 @@ impl<'a> Session<'a> {
         Ok(seen.map_or(Visit::Lost(why), Visit::Seen))
     }
 
-    /// The controller would not go there: that neighbourhood is not asked for again, and the arm, where it is stuck,
-    /// goes back to where it began.
+    /// Handles a refusal by the controller: poses near `to` are not requested again, and after several refusals the
+    /// arm returns to its first pose.
     fn elsewhere(&mut self, to: Rigid<Base, Flange>, why: &str) -> Result<()> {
         self.refused.push(to);
         self.stuck += 1;
@@ -265,10 +266,10 @@ impl<'a> Session<'a> {
         if self.stuck.is_multiple_of(BACK) { self.home().map(drop) } else { Ok(()) }
     }
 
-    /// Back to where it began over the places that it came by: so the joints unwind as they were wound. Straight back
-    /// would lead to the same pose with a joint a turn further, from where the next motion may be out of the joint's
-    /// range. Where a way cannot be gone back, because the arm stands a little beside it, the way straight back or an
-    /// earlier place is tried. False where none of them is reached: it goes on from where it stands.
+    /// Returns to the first pose over the poses that the arm came by, so that the joints unwind as they were wound.
+    /// A straight return could reach the same pose with a joint one turn off, from where the next motion may exceed
+    /// the joint's range. If a step back is refused, because the arm stands slightly off the path, the straight
+    /// return or an earlier pose is tried. False if none is reached: the procedure continues from the present pose.
     fn home(&mut self) -> Result<bool> {
         let began = self.trail[0];
         let mut there = true;
@@ -287,7 +288,7 @@ impl<'a> Session<'a> {
         Ok(there)
     }
 
-    /// A stop's features, its stripe told from reflections by the sheet of some stops before.
+    /// A stop's features; its stripe is distinguished from reflections with the sheet of some earlier stops.
     fn measured(&self, i: usize) -> Result<Shot> {
         let recordings = self.book.recordings();
         let with = FirstCamera { value: self.fit.state.camera, ..self.first.clone() };
@@ -316,7 +317,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Goes to poses that were not in the solve.
+    /// Goes to poses that were not in the solve and checks the result there.
     fn check(&mut self, joint: &JointResult) -> Result<Option<SelfCheck>> {
         let before = self.book.stops.len();
         for _ in 0..CHECK_ROUNDS {
@@ -334,17 +335,17 @@ impl<'a> Session<'a> {
     }
 }
 
-/// What came of going somewhere.
+/// The outcome of a visit to a pose.
 enum Visit {
     /// The board was seen: the stop's number.
     Seen(usize),
-    /// It was not, in words.
+    /// The board was not seen; the reason in words.
     Lost(String),
-    /// The arm did not go.
+    /// The arm did not go; the reason in words.
     NotBegun(String),
 }
 
-/// Whether two flange poses are of one neighbourhood, `distance` from the board.
+/// Whether two flange poses count as near each other, `distance` from the board.
 fn alike(a: &Rigid<Base, Flange>, b: &Rigid<Base, Flange>, distance: f64) -> bool {
     let (angle, mm) = a.difference(b);
     mm < NEAR.0 * distance && angle.to_degrees() < NEAR.1
@@ -359,7 +360,7 @@ fn lost(why: &str) -> Fault {
         .next("take a board of larger squares or begin nearer to it; check tool and work number of the controller (0)")
 }
 
-/// Refuses stops before and after which the board was moved.
+/// Refuses stops between which the board was moved.
 fn still(shots: &[Shot], fit: &JointFit, o: &JointOptions) -> Result<()> {
     match moved(shots, fit, o) {
         None => Ok(()),
@@ -369,10 +370,10 @@ fn still(shots: &[Shot], fit: &JointFit, o: &JointOptions) -> Result<()> {
     }
 }
 
-/// Tilt of the board against the picture that is asked for at most, degrees.
+/// Largest tilt of the board against the picture that is requested, degrees.
 const LARGEST_TILT: f64 = 45.0;
 
-/// How the board lay in the first picture: turn about the optical axis, rad.
+/// Orientation of the board in the first picture: turn about the optical axis, rad.
 fn upright(boards: &[Rigid<Camera, Board>]) -> f64 {
     boards.first().map_or(0.0, |b| b.rotation[(1, 0)].atan2(b.rotation[(0, 0)]))
 }
@@ -383,10 +384,10 @@ fn middle_depth(boards: &[Rigid<Camera, Board>], spec: &BoardSpec) -> f64 {
     boards.iter().map(|b| b.point(&centre).z).sum::<f64>() / boards.len().max(1) as f64
 }
 
-/// Fewest spots that tell a beam: two would leave nothing to judge them by.
+/// Fewest spots that determine a beam: two would leave no redundancy.
 const SPOTS: usize = 3;
 
-/// The stops, their spots only where they are enough to tell a beam: else nothing at all would be determined.
+/// The stops; their spots are removed if too few determine a beam, because otherwise nothing would be determined.
 fn with_beam(shots: &[Shot]) -> Vec<Shot> {
     let mut out = shots.to_vec();
     if shots.iter().filter(|s| s.spot.is_some()).count() < SPOTS {
@@ -395,7 +396,7 @@ fn with_beam(shots: &[Shot]) -> Vec<Shot> {
     out
 }
 
-/// All stops so far, solved from the beginning.
+/// All stops so far, solved from scratch.
 fn solved(
     book: &Notebook,
     run: &AutoRun,
@@ -410,7 +411,7 @@ fn solved(
     Ok((shots, fit))
 }
 
-/// The station's camera where it has one, else one that the small moves tell.
+/// The station's camera if it has one, else one from the small moves.
 fn first_camera(book: &Notebook, mount: Mount, size: [u32; 2], rig: &Rig) -> Result<FirstCamera> {
     let known = rig.camera.as_ref().filter(|c| [c.value.width, c.value.height] == size);
     let (value, covariance) = match known {

@@ -1,5 +1,5 @@
-//! In: the records of a joint solve, a check on poses that it did not see, why it ended. Out: the verdict with its
-//! reasons.
+//! In: the records of a joint solve, a check on poses that the solve did not use, the reason of the end. Out: the
+//! verdict with its reasons.
 //! Frame and unit: mm.
 
 use super::super::joint::run::JointResult;
@@ -15,28 +15,28 @@ pub enum Ended {
     Target,
     /// The expected error does not fall any more.
     Stalled,
-    /// As many stops as are allowed.
+    /// The allowed number of stops is reached.
     Most,
-    /// No pose from which the board can be seen may be gone to.
+    /// No pose from which the board can be seen is allowed.
     NoPose,
 }
 
-/// What [`super::procedure::calibrate_auto`] made.
+/// Result of [`super::procedure::calibrate_auto`].
 pub struct AutoResult {
     /// The rig.
     pub joint: JointResult,
     /// Expected error of a scanned point after each stop of the solve, mm rms; the first is after the small moves.
     pub expected_mm: Vec<f64>,
-    /// Stops that went into the solve.
+    /// Number of stops in the solve.
     pub stops: usize,
     /// Why it ended.
     pub ended: Ended,
-    /// On poses that no solve saw; `None` where none could be gone to.
+    /// The check on poses that no solve used; `None` if no such pose was allowed.
     pub check: Option<SelfCheck>,
 }
 
 impl AutoResult {
-    /// What the check and the end say goes into every record.
+    /// Adds the findings of the check and of the end to every record.
     pub(super) fn judge(&mut self, run: &AutoRun, stranded: Option<String>) {
         let mut reasons: Vec<String> =
             stranded.into_iter().map(|why| format!("the arm did not go back to where it began: {why}")).collect();

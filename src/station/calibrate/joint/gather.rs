@@ -1,5 +1,5 @@
-//! In: recordings. Out: the stops that they show: a board in room light, which laser pictures belong to it, where the
-//! robot stood; pictures that come twice count once.
+//! In: recordings. Out: their stops: a board in room light, the laser pictures that belong to it, the robot's pose.
+//! Pictures that occur twice count once.
 //! Frame and unit: px; base_from_flange in mm.
 
 use crate::calibrate::boards::{BoardView, FindOptions, find};
@@ -23,39 +23,39 @@ pub struct Picture {
     pub file: String,
 }
 
-/// Pictures taken without moving.
+/// Pictures that were taken at one standstill.
 #[derive(Clone, Debug)]
 pub struct Stop {
-    /// As messages name it: the picture in room light, its recording before it where there are several.
+    /// Its name in messages: the picture in room light, with its recording if there are several.
     pub name: String,
-    /// As meta.json describes it.
+    /// The board as meta.json describes it.
     pub board: BoardSpec,
-    /// Its features in room light.
+    /// The board's features in room light.
     pub view: BoardView,
-    /// Where the robot said that it stood, and which of the boards' places it saw.
+    /// The robot's reported pose, and the index of the board position that it saw.
     pub robot: Option<Reported>,
-    /// In room light.
+    /// The picture in room light.
     pub room: Picture,
-    /// With the line laser on.
+    /// The picture with the line laser on.
     pub line: Option<Picture>,
-    /// With the pointer on.
+    /// The picture with the pointer on.
     pub pointer: Option<Picture>,
 }
 
-/// All that the recordings show.
+/// The content of all recordings.
 #[derive(Clone, Debug, Default)]
 pub struct Gathered {
-    /// In the recordings' order.
+    /// The stops in the recordings' order.
     pub stops: Vec<Stop>,
     /// Pictures that could not be used, with the reason.
     pub missing: Vec<(String, String)>,
-    /// Name to SHA-256 of everything that went in.
+    /// Name and SHA-256 of every input.
     pub inputs: BTreeMap<String, String>,
-    /// How all pictures were read from the sensor, where all recordings say so.
+    /// The sensor readout of all pictures, if all recordings state it.
     pub readout: Option<Readout>,
-    /// Pixels that shine in all pictures by themselves.
+    /// Hot pixels, which are bright in all pictures.
     pub hot: HotPixels,
-    /// How many places boards stood at.
+    /// Number of positions at which boards stood.
     pub places: usize,
 }
 
@@ -98,8 +98,8 @@ fn same_size(recordings: &[Recording]) -> Result<()> {
     }
 }
 
-/// Finds the boards of all recordings. `poses` names the pose file of those that have several. A stop of two
-/// recordings (the same picture in room light) has the laser pictures of both.
+/// Finds the boards of all recordings. `poses` names the pose file of recordings that have several. A stop of two
+/// recordings (the same picture in room light) gets the laser pictures of both.
 pub fn gather(
     recordings: &[Recording],
     poses: Option<&str>,
@@ -118,7 +118,7 @@ pub fn gather(
     for (f, (hash, view)) in frames.iter().zip(boards(recordings, &frames, progress)?) {
         match view {
             Ok(view) => gathering.add(f, hash, view)?,
-            // Missing files and misdescribed boards are the recording's fault, not one picture's.
+            // Missing files and wrongly described boards concern the whole recording, not one picture.
             Err(fault) if fault.kind != Kind::Refused => return Err(fault),
             Err(fault) => gathering.out.missing.push((f.name.clone(), format!("{} ({})", fault.what, fault.cause))),
         }
@@ -133,7 +133,7 @@ pub fn gather(
     Ok(Gathered { places: places.len(), ..out })
 }
 
-/// The robot's poses of each recording, where it has some.
+/// The robot's poses of each recording; `None` if it has none.
 type Robots = Vec<Option<Vec<Rigid<Base, Flange>>>>;
 
 /// The frames with a picture in room light, the robot's poses, and the hash of each meta.json.
@@ -157,7 +157,7 @@ fn listed<'a>(
     Ok((frames, robots, inputs))
 }
 
-/// Each picture's hash, and the board in it.
+/// Each picture's hash, and its board.
 fn boards(
     recordings: &[Recording],
     frames: &[Frame<'_>],
@@ -180,11 +180,11 @@ fn boards(
     frames.par_iter().map(look).collect()
 }
 
-/// Stops as their pictures come in.
+/// Collects stops picture by picture.
 struct Gathering<'a> {
     recordings: &'a [Recording],
     robots: Robots,
-    /// Where boards stood: recording, and index of the board there.
+    /// Positions of boards: recording, and index of the board there.
     places: Vec<(usize, usize)>,
     /// Index of a stop by the hash of its picture in room light.
     known: BTreeMap<String, usize>,
@@ -192,7 +192,8 @@ struct Gathering<'a> {
 }
 
 impl Gathering<'_> {
-    /// A picture in room light and what belongs to it: a stop, or more of one that another recording has shown.
+    /// Adds a picture in room light with its laser picture: a new stop, or more data of a stop that another
+    /// recording contains.
     fn add(&mut self, f: &Frame<'_>, hash: String, view: BoardView) -> Result<()> {
         let r = &self.recordings[f.recording];
         let frame = &r.meta.frames[f.index];
@@ -230,7 +231,7 @@ impl Gathering<'_> {
         Ok(())
     }
 
-    /// Index of the place where a recording's board stood.
+    /// Index of the position of a recording's board.
     fn place(&mut self, recording: usize, board: usize) -> usize {
         let known = self.places.iter().position(|p| *p == (recording, board));
         known.unwrap_or_else(|| {

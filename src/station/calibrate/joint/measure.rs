@@ -1,5 +1,5 @@
-//! In: stops, a camera that is roughly right. Out: stops as the joint solve takes them, and what separate
-//! calibrations of the same pictures come to.
+//! In: stops, an approximate camera. Out: stops as input of the joint solve, and the separate calibrations from the
+//! same pictures.
 //! Frame and unit: mm, px.
 
 use super::super::board_views::FrameBoard;
@@ -25,43 +25,43 @@ use crate::fault::{Kind, Result};
 use crate::raster::Image;
 use crate::recording::Recording;
 
-/// Fewest stops with a robot's pose before one board from which a hand-eye transform is worked out by itself.
+/// Fewest stops with a robot pose for one board position from which a separate hand-eye transform is computed.
 const FEWEST_PAIRS: usize = 4;
 
-/// What separate calibrations of the same pictures come to, each with the camera that was given.
+/// Separate calibrations from the same pictures, each with the given camera.
 #[derive(Default)]
 pub struct Separate {
-    /// From the place that most stops show.
+    /// Hand-eye from the board position that most stops show.
     pub hand_eye: Option<HandEyeFit>,
-    /// From all stops with a stripe.
+    /// Laser plane from all stops with a stripe.
     pub sheet: Option<LaserPlaneFit>,
-    /// From all stops with a spot.
+    /// Pointer from all stops with a spot.
     pub beam: Option<PointerFit>,
 }
 
-/// Stops as the joint solve takes them.
+/// Stops as input of the joint solve.
 pub struct Measured {
-    /// One a stop whose board has a pose.
+    /// One shot per stop whose board has a pose.
     pub shots: Vec<Shot>,
-    /// What does not count, and why.
+    /// What is excluded, and why.
     pub left_out: Vec<LeftOut>,
-    /// Of the same pictures.
+    /// Separate calibrations from the same pictures.
     pub separate: Separate,
 }
 
-/// What stops are measured with.
+/// Inputs and settings for measuring stops.
 pub struct Finders<'a> {
-    /// Whose pictures the stops name.
+    /// The recordings that contain the stops' pictures.
     pub recordings: &'a [Recording],
-    /// The camera that is roughly right.
+    /// The approximate camera.
     pub camera: &'a Intrinsics,
-    /// Of its parameters.
+    /// Covariance of its parameters.
     pub covariance: &'a CameraCovariance,
-    /// Of the stripe.
+    /// Settings for the stripe.
     pub line: &'a LaserPlaneRun,
-    /// Of the spot.
+    /// Settings for the spot.
     pub pointer: &'a PointerRun,
-    /// Who carries the camera.
+    /// Whether the camera is on the flange or stands still.
     pub mount: Mount,
 }
 
@@ -91,8 +91,8 @@ impl Measured {
 /// Measures boards, stripes and spots of all stops.
 ///
 /// # Errors
-/// Pictures that cannot be read; poses that do not belong to the pictures of their board; a stripe or a spot that no
-/// sheet or beam explains.
+/// Pictures that cannot be read; poses that do not belong to the pictures of their board; a stripe or a spot that
+/// fits no sheet or beam.
 pub fn measure(gathered: &Gathered, how: &Finders<'_>) -> Result<Measured> {
     let mut left_out = Vec::new();
     let mut boards: Vec<Placed<'_>> = Vec::new();
@@ -116,7 +116,7 @@ pub fn measure(gathered: &Gathered, how: &Finders<'_>) -> Result<Measured> {
     Ok(out)
 }
 
-/// Reads a place's turned boards alike, leaves out the poses that contradict the others.
+/// Gives a position's turned boards one common origin, and excludes poses that contradict the others.
 fn robots(boards: &[Placed<'_>], place: usize, how: &Finders<'_>, out: &mut Measured) -> Result<()> {
     let here: Vec<usize> = (0..boards.len()).filter(|&i| boards[i].0.robot.is_some_and(|r| r.place == place)).collect();
     if here.len() < FEWEST_PAIRS {
@@ -184,7 +184,7 @@ fn stripes(boards: &[Placed<'_>], how: &Finders<'_>, out: &mut Measured) -> Resu
     Ok(())
 }
 
-/// The spots that pictures show, whether they lie on one beam or not: the stop's index, and its spot.
+/// The spots in the pictures, whether or not they lie on one beam: the stop's index, and its spot.
 fn found_spots(boards: &[Placed<'_>], how: &Finders<'_>, out: &mut Measured) -> Result<Vec<(usize, SpotView)>> {
     let (mut lit, mut pictures) = (Vec::new(), Vec::new());
     for (i, b) in boards.iter().enumerate() {
@@ -231,8 +231,8 @@ fn spots(boards: &[Placed<'_>], how: &Finders<'_>, out: &mut Measured) -> Result
     Ok(())
 }
 
-/// Stops whose poses, stripes and spots nothing has been compared with yet: the joint solve does that. A stop whose
-/// board has no pose is refused; stripes that tell no sheet are none.
+/// Stops whose poses, stripes and spots were not compared with anything yet: the joint solve does that. A stop
+/// whose board has no pose is refused; stripes that determine no sheet are dropped.
 pub fn unjudged(stops: &[&Stop], how: &Finders<'_>) -> Result<Vec<Shot>> {
     let mut boards: Vec<Placed<'_>> = Vec::new();
     for stop in stops {

@@ -1,5 +1,5 @@
-//! In: recordings of boards, in any order, with robot poses, stripe and spot where they have them. Out: the whole rig's
-//! calibration from one joint solve, beside what separate calibrations of the same pictures come to.
+//! In: recordings of boards, in any order, some with robot poses, stripe or spot. Out: the whole rig's calibration
+//! from one joint solve, besides separate calibrations from the same pictures.
 //! Frame and unit: mm, rad, px; each file names its frames.
 
 pub(in crate::station) mod gather;

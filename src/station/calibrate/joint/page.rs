@@ -1,4 +1,4 @@
-//! In: a joint solve and its verdict. Out: the page that a person reads.
+//! In: a joint solve and its verdict. Out: the page for a person.
 //! Frame and unit: mm, degrees, px.
 
 use crate::calibrate::joint::limits::by_part;

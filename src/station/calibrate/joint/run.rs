@@ -33,14 +33,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
-/// How [`calibrate_joint`] is run.
+/// Options of [`calibrate_joint`].
 #[derive(Clone, Debug)]
 pub struct JointRun {
     /// Pose file of recordings that have several, without extension.
     pub poses: Option<String>,
-    /// Who carries the camera.
+    /// Whether the camera is on the flange or stands still.
     pub mount: Mount,
-    /// How the camera is solved that the joint solve starts from.
+    /// Options of the camera solve from which the joint solve starts.
     pub camera: SolveOptions,
     /// How the stripe is found.
     pub line: LaserPlaneRun,
@@ -51,7 +51,7 @@ pub struct JointRun {
 }
 
 impl JointRun {
-    /// With the settings that every part has by itself.
+    /// Options in which every part has its own default settings.
     pub fn new(mount: Mount, asked: Asked, extraction: &Extraction, place: Where) -> JointRun {
         let (solver, extraction) = (LaserPlaneOptions::default(), extraction.clone());
         JointRun {
@@ -78,19 +78,19 @@ impl JointRun {
     }
 }
 
-/// What [`calibrate_joint`] made.
+/// Result of [`calibrate_joint`].
 pub struct JointResult {
-    /// The records that the recordings speak of; the others are `None`.
+    /// The records that the recordings determine; the others are `None`.
     pub rig: Rig,
     /// Covariance of all records together.
     pub together: JointCovariance,
     /// The verdict, the same in every record.
     pub quality: Quality,
-    /// For people.
+    /// The report for a person.
     pub page: Page,
     /// The solve itself.
     pub fit: JointFit,
-    /// What separate calibrations of the same pictures come to, one after another.
+    /// The separate calibrations from the same pictures, one after another.
     pub separate: State,
 }
 
@@ -100,7 +100,7 @@ impl JointResult {
         self.quality.figures.get("expected_error_mm").copied().unwrap_or(f64::INFINITY)
     }
 
-    /// Adds to the verdict what was found out afterwards, in every record.
+    /// Adds later findings to the verdict, in every record.
     pub(in crate::station) fn remark(&mut self, at_best: Verdict, reasons: &[String]) {
         self.quality.verdict = self.quality.verdict.max(at_best);
         self.quality.reasons.extend_from_slice(reasons);
@@ -113,7 +113,7 @@ impl JointResult {
     }
 }
 
-/// A camera to start from, what is free in it, and what is known of it from elsewhere.
+/// The camera from which the solve starts, its free parameters, and its prior from other data.
 #[derive(Clone)]
 pub(in crate::station) struct FirstCamera {
     pub value: Intrinsics,
@@ -122,7 +122,8 @@ pub(in crate::station) struct FirstCamera {
     pub prior: Option<CameraPrior>,
 }
 
-/// From the pictures themselves; the station's, where it was calibrated from others, is held against them.
+/// A camera from the pictures themselves; if the station's camera was calibrated from other pictures, that camera
+/// is used, with its covariance as prior.
 pub(in crate::station) fn first_camera(
     gathered: &Gathered,
     size: [u32; 2],
@@ -148,7 +149,7 @@ pub(in crate::station) fn first_camera(
         view: s.view.clone(),
     };
     let seen: Vec<Observation> = gathered.stops.iter().map(observe).collect();
-    // What is solved for together takes boards as drawn.
+    // The joint solve assumes boards as drawn.
     let drawn = SolveOptions { boards: Boards::Drawn, ..run.camera.clone() };
     let found = solve_camera(&seen, size[0], size[1], &drawn)?;
     let covariance = found.covariance.ok_or_else(|| {
@@ -160,12 +161,12 @@ pub(in crate::station) fn first_camera(
     Ok(FirstCamera { value: found.intrinsics, covariance: CameraCovariance::new(covariance)?, free, prior: None })
 }
 
-/// Solves for everything that the recordings show, in any order, as many as there are. `progress` is told (pictures
-/// done, pictures in all).
+/// Solves for everything that the recordings show; their order and number do not matter. `progress` receives
+/// (pictures done, pictures in all).
 ///
 /// # Errors
-/// Recordings of two cameras; no board in any picture; poses that do not belong to the pictures; what is not
-/// determined.
+/// Recordings of two cameras; no board in any picture; poses that do not belong to the pictures; something that is
+/// not determined.
 pub fn calibrate_joint(
     recordings: &[Recording],
     rig: &Rig,
@@ -200,7 +201,7 @@ fn concluded(gathered: &Gathered, first: &FirstCamera, measured: Measured, run: 
         .or(boards)
         .unwrap_or_else(|| Volume::new(1.0, 1.0, "nowhere"));
     let limits = run.asked.limits(&seen, |z| first.value.view_mm(z));
-    // Without a stripe, points are judged on a plane across the optical axis.
+    // Without a stripe, points are judged on a plane perpendicular to the optical axis.
     let middle = Plane::new(Vec3::z(), limits.middle()).expect("of length one");
     let separately_found = separate_state(&separate, &first.value, middle);
     let (state, more) = start(&mut shots, gathered.places, &first.value, Some(&separately_found), &o)?;
@@ -251,7 +252,7 @@ fn separate_state(separate: &Separate, camera: &Intrinsics, middle: Plane<Camera
     }
 }
 
-/// Expected error by separate calibrations, and how far their points lie from the joint ones.
+/// Expected error of the separate calibrations, and the distance of their points from the joint ones.
 fn separated(
     fit: &JointFit,
     separate: &Separate,
@@ -311,7 +312,7 @@ fn records(fit: &JointFit, hand_eye: Kind, quality: &Quality, gathered: &Gathere
     rig
 }
 
-/// What each record holds.
+/// A hash of the content of each record.
 fn contents(rig: &Rig) -> BTreeMap<Kind, String> {
     let mut of = BTreeMap::new();
     of.extend(rig.camera.as_ref().map(|c| (c.kind, c.content())));
@@ -322,13 +323,13 @@ fn contents(rig: &Rig) -> BTreeMap<Kind, String> {
     of
 }
 
-/// Stores all records, their covariance together (`joint.json`, of no meaning for other records) and the page
+/// Stores all records, their joint covariance (`joint.json`, valid only for these records) and the page
 /// (`joint.html`), all of them or none.
 pub fn store_joint(station: &Path, result: &JointResult) -> Result<Vec<Kind>> {
     store_set(station, &result.rig, &result.together, result.page.html())
 }
 
-/// Stores in a station what [`store_joint`] has kept in another folder, all of it or nothing.
+/// Stores in a station what [`store_joint`] has written into another folder, all of it or nothing.
 ///
 /// # Errors
 /// The folder holds no joint calibration, or one that is badly determined; the disk.
@@ -350,7 +351,7 @@ pub fn accept_joint(kept: &Path, station: &Path) -> Result<Vec<Kind>> {
     store_set(station, &rig, together, page)
 }
 
-/// Covariance of all records, and the page, beside the records.
+/// File names of the covariance of all records, and of the page, beside the records.
 const COVARIANCE: &str = "joint.json";
 const PAGE: &str = "joint.html";
 

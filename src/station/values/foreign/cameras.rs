@@ -1,12 +1,12 @@
-//! A camera from the keys of another program's calibration: OpenCV, ROS camera_info, Kalibr, MATLAB. What this
-//! program's lens cannot say is refused by its name.
+//! A camera from the keys of another program's calibration: OpenCV, ROS camera_info, Kalibr, MATLAB. A lens model
+//! that this program cannot represent is refused by name.
 
 use super::{halcon, tree};
 use crate::camera::{Distortion, Intrinsics};
 use crate::fault::{Fault, Result};
 use serde_json::Value;
 
-/// Names under which programs keep the same thing.
+/// Key names that programs use for the same content.
 const MATRIX: [&str; 8] =
     ["camera_matrix", "Camera_Matrix", "cameraMatrix", "CameraMatrix", "intrinsic_matrix", "K", "M1", "k"];
 const LENS: [&str; 10] = [
@@ -25,7 +25,7 @@ const WIDTH: [&str; 3] = ["image_width", "image_Width", "width"];
 const HEIGHT: [&str; 3] = ["image_height", "image_Height", "height"];
 const SIZE: [&str; 3] = ["image_size", "imageSize", "resolution"];
 
-/// The camera in a file, and what a person should know of the way that it was read; `None` where the file holds none of
+/// The camera in a file, and a remark for the user on how it was read; `None` if the file holds no camera of
 /// another program.
 pub fn camera(text: &str) -> Result<Option<(Intrinsics, String)>> {
     if halcon::is_one(text) {
@@ -33,7 +33,7 @@ pub fn camera(text: &str) -> Result<Option<(Intrinsics, String)>> {
     }
     let file = match tree::read(text) {
         Ok(file) => file,
-        // Values of this program's own are JSON; who reads them says what is wrong with them.
+        // This program's own values are JSON; their reader reports what is wrong with them.
         Err(_) if text.trim_start_matches('\u{feff}').trim_start().starts_with('{') => return Ok(None),
         Err(fault) => return Err(fault),
     };
@@ -81,7 +81,7 @@ fn numbers(v: &Value) -> Option<Vec<f64>> {
     }
 }
 
-/// Numbers of something that is there, as many as are said.
+/// The numbers of a value; refuses a count that is not in `counts`.
 fn exactly(v: &Value, what: &str, counts: &[usize]) -> Result<Vec<f64>> {
     numbers(v).filter(|n| counts.contains(&n.len())).ok_or_else(|| {
         let found = numbers(v).map_or("something else".into(), |n| format!("{} numbers", n.len()));
@@ -119,7 +119,7 @@ fn from_matrix(k: &[f64], distortion: Distortion, [width, height]: [u32; 2]) -> 
     Ok(Intrinsics { fx: k[0], fy: k[4], cx: k[2], cy: k[5], skew: k[1], distortion, width, height })
 }
 
-/// OpenCV's own calibration programs, and ROS' camera_info, which has the same keys and names the lens model.
+/// Files of OpenCV's calibration programs, and ROS' camera_info, which has the same keys and names the lens model.
 fn opencv(file: &Value) -> Result<(Intrinsics, String)> {
     let matrix = any(file, &MATRIX).ok_or_else(|| missing("camera matrix", &MATRIX))?;
     let matrix = exactly(matrix, "the camera matrix", &[9])?;
@@ -146,8 +146,8 @@ fn opencv(file: &Value) -> Result<(Intrinsics, String)> {
     Ok((from_matrix(&matrix, distortion, size(file)?)?, said))
 }
 
-/// What a camera_info message says of the pictures that its driver sends now. Its matrix and its size are those of the
-/// whole sensor whatever these are (sensor_msgs/CameraInfo, "operational parameters"); 0 stands for "not used".
+/// What a camera_info message reports of its driver's present pictures. Its matrix and size are always those of the
+/// whole sensor (sensor_msgs/CameraInfo, "operational parameters"); 0 means "not used".
 fn driver(file: &Value) -> Option<String> {
     let number = |v: &Value, key: &str| v.get(key).and_then(Value::as_f64).unwrap_or(0.0);
     let binned = ["binning_x", "binning_y"].map(|key| number(file, key).max(1.0));

@@ -1,15 +1,15 @@
-//! HALCON's camera parameters (`write_cam_par`): lengths in metres, a lens that leads from the distorted picture to the
-//! ideal one.
+//! HALCON's camera parameters (`write_cam_par`): lengths in metres, a lens polynomial that maps the distorted
+//! picture to the ideal one.
 
 use crate::camera::{Distortion, Intrinsics};
 use crate::fault::{Fault, Result};
 use nalgebra::{SMatrix, SVector};
 use std::collections::BTreeMap;
 
-/// The way back of HALCON's polynomial may differ from it by so much over the picture, px.
+/// Largest difference over the picture between HALCON's polynomial and its fitted inverse, px.
 const FAITHFUL: f64 = 0.05;
 
-/// Whether a file is one.
+/// Whether a file holds HALCON's parameters.
 pub fn is_one(text: &str) -> bool {
     text.contains("ParGroup:") && text.contains("Camera") && text.contains("Focus:")
 }
@@ -28,7 +28,7 @@ fn parameters(text: &str) -> BTreeMap<String, f64> {
     text.split(';').filter_map(statement).collect()
 }
 
-/// The camera, and what is said of the way that it was read.
+/// The camera, and a remark on how the file was read.
 pub fn camera(text: &str) -> Result<(Intrinsics, String)> {
     let all = parameters(text);
     let of = |names: &[&str]| names.iter().find_map(|n| all.get(*n).copied());
@@ -86,7 +86,7 @@ pub fn camera(text: &str) -> Result<(Intrinsics, String)> {
     Ok((Intrinsics { distortion, ..plain }, said))
 }
 
-/// The terms that lead to the distorted picture, and how far they are off, px.
+/// Fits the terms that map to the distorted picture; also returns their largest error, px.
 fn forward(plain: &Intrinsics, focus: f64, [k1, k2, k3, p1, p2]: [f64; 5]) -> Result<(Distortion, f64)> {
     let mut pairs = Vec::new();
     const CELLS: u32 = 24;
@@ -94,7 +94,7 @@ fn forward(plain: &Intrinsics, focus: f64, [k1, k2, k3, p1, p2]: [f64; 5]) -> Re
         for i in 0..=CELLS {
             let u = f64::from(i) / f64::from(CELLS) * f64::from(plain.width) - 0.5;
             let v = f64::from(j) / f64::from(CELLS) * f64::from(plain.height) - 0.5;
-            // HALCON's polynomial is of metres on the sensor.
+            // HALCON's polynomial is in metres on the sensor.
             let [x, y] = [(u - plain.cx) / plain.fx, (v - plain.cy) / plain.fy];
             let [a, b] = [x * focus, y * focus];
             let r2 = a * a + b * b;
@@ -106,7 +106,7 @@ fn forward(plain: &Intrinsics, focus: f64, [k1, k2, k3, p1, p2]: [f64; 5]) -> Re
             pairs.push((ideal.map(|m| m / focus), [x, y]));
         }
     }
-    // The terms are linear in what they move.
+    // The displacement is linear in the terms.
     let (mut h, mut g) = (SMatrix::<f64, 5, 5>::zeros(), SVector::<f64, 5>::zeros());
     for ([x, y], seen) in &pairs {
         let r2 = x * x + y * y;

@@ -1,10 +1,10 @@
-//! The keys of a calibration file, whether it is YAML, XML or JSON.
+//! The keys of a calibration file in YAML, XML or JSON.
 
 use super::yaml;
 use crate::fault::{Fault, Result};
 use serde_json::{Map, Value};
 
-/// What a file says, by its keys.
+/// The content of a file by its keys.
 pub fn read(text: &str) -> Result<Value> {
     let text = text.trim_start_matches('\u{feff}');
     match text.trim_start().chars().next() {
@@ -18,7 +18,7 @@ pub fn read(text: &str) -> Result<Value> {
     }
 }
 
-/// OpenCV's XML: elements within `opencv_storage`, numbers parted by blanks.
+/// OpenCV's XML: elements within `opencv_storage`, numbers separated by blanks.
 fn xml(text: &str) -> Result<Value> {
     let mut stack: Vec<(String, Map<String, Value>, String)> = vec![(String::new(), Map::new(), String::new())];
     let mut rest = text;

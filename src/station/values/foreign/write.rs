@@ -1,9 +1,9 @@
-//! A camera as OpenCV, ROS and Kalibr read it. Numbers have all their digits.
+//! Writes a camera as OpenCV, ROS and Kalibr read it, with all digits.
 
 use crate::camera::{Distortion, Intrinsics};
 use crate::fault::{Fault, Result};
 
-/// What a file is written for.
+/// The program that a file is written for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
 #[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Format {
@@ -25,7 +25,7 @@ fn unknown(word: &str) -> String {
 /// The text of a file for another program; `extension` is that of the file's name.
 ///
 /// # Errors
-/// What the other program has no word for: terms of the lens, skew.
+/// The other program has no representation for a term of the lens, or for skew.
 pub fn written(camera: &Intrinsics, format: Format, extension: &str) -> Result<String> {
     match (format, extension) {
         (Format::Opencv, "xml") => Ok(opencv_xml(camera)),
@@ -42,7 +42,7 @@ pub fn written(camera: &Intrinsics, format: Format, extension: &str) -> Result<S
     }
 }
 
-/// Numbers as every reader takes them: with a point or an exponent.
+/// Numbers in a form that every reader accepts: with a point or an exponent.
 fn list(numbers: &[f64]) -> String {
     numbers.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>().join(", ")
 }
@@ -104,7 +104,7 @@ fn opencv_json(k: &Intrinsics) -> String {
     )
 }
 
-/// Refuses a lens with more terms than another program has words for.
+/// Refuses a lens with more terms than the other program knows.
 fn terms(d: &Distortion, most: usize, program: &str) -> Result<Vec<f64>> {
     let used = d.0.iter().rposition(|t| *t != 0.0).map_or(0, |i| i + 1);
     if used > most {

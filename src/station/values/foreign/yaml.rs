@@ -4,18 +4,18 @@ use crate::fault::{Fault, Result};
 use saphyr_parser::{Event, Parser, ScalarStyle};
 use serde_json::{Map, Value};
 
-/// Deeper files are refused: what reads the content later goes into it recursively.
+/// Greatest depth of nesting; deeper files are refused, because later readers descend recursively.
 const DEEPEST: usize = 30;
 
-/// A list or map that has not ended yet; a map with the key whose value comes next.
+/// A list or map that has not ended yet; a map also holds the key whose value comes next.
 enum Open {
     List(Vec<Value>),
     Map(Map<String, Value>, Option<String>),
 }
 
-/// The content of a file. Aliases are refused: a file of a few lines can name terabytes with them.
+/// The content of a file. Aliases are refused: with them a file of a few lines can expand to terabytes.
 pub fn parse(text: &str) -> Result<Value> {
-    // OpenCV begins its files with '%YAML:1.0', which YAML's own directive '%YAML 1.0' is not.
+    // OpenCV begins its files with '%YAML:1.0', which differs from YAML's own directive '%YAML 1.0'.
     let text: String = text.lines().map(|l| if l.starts_with('%') { "\n".into() } else { format!("{l}\n") }).collect();
     let (mut open, mut whole) = (Vec::new(), None);
     for event in Parser::new_from_str(&text) {
@@ -70,7 +70,7 @@ fn unread(line: usize, what: &str) -> Fault {
         .next("write the calibration again, as YAML, XML or JSON")
 }
 
-/// A number where it is one (OpenCV writes `1.` and `.Nan`), else text.
+/// A number if the text is one (OpenCV writes `1.` and `.Nan`), else text.
 pub fn scalar(text: &str) -> Value {
     if matches!(text, "" | "~" | "null") {
         return Value::Null;
