@@ -6,7 +6,7 @@
 set -eu
 folder=$1 set=$2
 case $set in
-  test) packages="numpy scipy libigl maturin==1.* mypy pytest" ;;
+  test) packages="numpy scipy libigl maturin==1.* mypy prometheus-client pytest" ;;
   files) packages="laspy[lazrs] matplotlib mcap mcap-ros2-support opencv-contrib-python-headless==4.14.* pyarrow pye57"
     packages="$packages pypcd4 rosbags tifffile trimesh xarray" ;;
   peers) packages="numpy scipy numba opencv-contrib-python-headless==4.14.*" ;;

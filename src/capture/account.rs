@@ -3,6 +3,7 @@
 //! Frame and unit: pictures.
 
 use super::clock::now_ns;
+use super::metrics::Metrics;
 
 /// What became of every picture that the camera says it sent.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -67,13 +68,17 @@ impl Account {
 
     /// As Prometheus reads it.
     pub fn prometheus(&self, camera: &str) -> String {
-        let camera = camera.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n");
-        let mut out = String::from("# HELP sheetlight_frames_total Pictures of a camera by what became of them.\n");
-        out += "# TYPE sheetlight_frames_total counter\n";
-        for (name, n) in self.rows() {
-            out += &format!("sheetlight_frames_total{{camera=\"{camera}\",fate=\"{name}\"}} {n}\n");
-        }
-        out
+        let mut metrics = Metrics::default();
+        self.count(camera, &mut metrics);
+        metrics.text()
+    }
+
+    /// Adds the pictures of a camera to what Prometheus reads.
+    pub fn count(&self, camera: &str, metrics: &mut Metrics) {
+        let help = "Pictures of a camera by what became of them.";
+        let rows = self.rows();
+        let figures = rows.iter().map(|(result, n)| (vec![("camera", camera), ("result", *result)], *n));
+        metrics.family(("sheetlight_frames_total", "counter"), help, figures);
     }
 }
 

@@ -10,6 +10,7 @@ mod feed;
 mod format;
 mod latency;
 mod look;
+pub mod metrics;
 pub mod pair;
 mod picture;
 pub mod record;

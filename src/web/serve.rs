@@ -60,6 +60,8 @@ pub struct ServeOptions {
     pub may_move: bool,
     /// Password and TLS.
     pub secured: Option<Secured>,
+    /// Token by which a program may read the figures, and nothing else.
+    pub metrics: Option<String>,
     /// Ends the server when it is set.
     pub stop: Arc<AtomicBool>,
 }
@@ -155,7 +157,8 @@ async fn run(
     let cookie = format!("sheetlight_{}", address.port());
     let hosts = hosts(options)?;
     let url = hosts.url(address);
-    let guard = Arc::new(Door { hosts, sessions: sessions.clone(), cookie: cookie.clone() });
+    let guard =
+        Arc::new(Door { hosts, sessions: sessions.clone(), metrics: options.metrics.clone(), cookie: cookie.clone() });
     let password = options.secured.as_ref().map(|s| Tries::against(s.password.clone())).transpose()?;
     let screen = Arc::new(Screen::new(jobs, sessions, cookie, password));
     let app = router(screen.clone()).layer(from_fn_with_state(guard, door));
@@ -291,6 +294,7 @@ mod tests {
             robot: Some(uri.clone()),
             may_move: true,
             secured: None,
+            metrics: None,
             stop: Arc::default(),
         };
         let links = Links {

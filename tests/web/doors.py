@@ -16,6 +16,8 @@ from server import Server, frame
 from waits import PATIENCE, until
 
 program, folder = sys.argv[1:3]
+# Reads the figures, and nothing else.
+FIGURES = "figures-0123456789-abcdefghij"
 
 
 def refused(what, status):
@@ -49,6 +51,36 @@ def who_gets_in(s):
     assert s.ask("GET", "/api/v1/bar", token=False, Cookie=cookie.split(";")[0])[0] == 200
     refused("a cookie of another value", s.ask("GET", "/api/v1/bar", token=False, Cookie=cookie.split(";")[0][:-4] + "0000")[0])
     return cookie.split(";")[0]
+
+
+def figures(s):
+    """What Prometheus scrapes is read by its own parser, and says what the other routes say."""
+    refused("figures without a token", s.ask("GET", "/api/v1/metrics", token=False)[0])
+    assert s.ask("GET", "/api/v1/metrics")[0] == 200
+    for method, path in (("GET", "/api/v1/bar"), ("GET", "/api/v1/metrics/"), ("POST", "/api/v1/stop"), ("POST", "/api/v1/lease")):
+        refused(f"{path} with the figures' token", s.ask(method, path, {} if method == "POST" else None, token=FIGURES)[0])
+    refused("figures with another token", s.ask("GET", "/api/v1/metrics", token=FIGURES[:-1])[0])
+    status, head, body = s.ask("GET", "/api/v1/metrics", token=FIGURES)
+    assert status == 200 and head["content-type"].startswith("text/plain; version=0.0.4"), (status, head)
+    try:
+        from prometheus_client.parser import text_string_to_metric_families
+    except ImportError:
+        print("*** SKIPPED: no prometheus-client here: the figures are not parsed ***")
+        return
+    all_ = {f.name: f for f in text_string_to_metric_families(body.decode())}
+    one = lambda name: [x.value for x in all_[name].samples]
+    jobs = json.loads(s.ask("GET", "/api/v1/jobs")[2])
+    counted = {(x.labels["procedure"], x.labels["state"]): x.value for x in all_.get("sheetlight_jobs").samples}
+    for (procedure, state), n in counted.items():
+        assert n == sum(j["order"]["procedure"] == procedure and j["state"] == state for j in jobs), (procedure, state)
+    assert sum(counted.values()) == len(jobs) > 0, counted
+    bar = json.loads(s.ask("GET", "/api/v1/bar")[2])
+    assert abs(one("sheetlight_disk_free_bytes")[0] / 1e9 - bar["disk_left_gb"]) < 1, bar["disk_left_gb"]
+    assert one("sheetlight_robot_linked") == [0] and one("sheetlight_job_running") == [0]
+    assert abs(one("sheetlight_calibration_expected_error_mm")[0] - bar["calibration"]["expected_mm"]) < 1e-9
+    (info,) = all_["sheetlight_build_info"].samples
+    assert info.labels["station"] == bar["station"], info
+    print(f"{len(all_)} families of figures")
 
 
 def names(s, job):
@@ -276,7 +308,14 @@ def starts():
 
 def main():
     starts()
-    s = Server(program, folder, "--recordings", folder)
+    token = os.path.join(folder, "figures.token")
+    with open(token, "w") as f:
+        f.write("too short\n")
+    bad = subprocess.run([program, "station", "serve", "--station", os.path.join(folder, "station"), "--metrics-token-file", token], capture_output=True, text=True, timeout=PATIENCE)
+    assert bad.returncode == 2 and "20 printable" in bad.stderr, bad.stderr
+    with open(token, "w") as f:
+        f.write(FIGURES + "\n")
+    s = Server(program, folder, "--recordings", folder, "--metrics-token-file", token)
     cookie = who_gets_in(s)
     scanned = s.job({"procedure": "scan", "recording": "scan"})
     assert scanned["state"] == "done", scanned
@@ -284,6 +323,7 @@ def main():
     assert found["state"] == "done" and found["outcome"]["passed"], found
     lease(s, cookie, found)
     names(s, scanned["id"])
+    figures(s)
     bodies(s)
     viewers(s)
     assert s.token not in "".join(s.said), "the token is in what the program said"

@@ -7,7 +7,7 @@ use super::spare::Spare;
 use super::words;
 use crate::arm::{Allowed, Arm, Halt, Mode, Pace, PoseSource, Reach, SIMULATED, State, Switch, TimedPose, Way};
 use crate::bcap::{Call, Network, Variant};
-use crate::fault::{Kind, Result};
+use crate::fault::{Fault, Kind, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use std::sync::Arc;
 
@@ -60,7 +60,7 @@ impl Denso {
 
     /// Share of the full speeds, %. On a straight path translation and turn end together: whichever takes longer
     /// determines the time.
-    fn percent(&self, way: Way, pace: &Pace) -> f64 {
+    fn percent(&self, way: Way, pace: &Pace) -> Result<f64> {
         let share = match way {
             Way::Straight => (pace.flange_mm_s / self.full.mm_s).max(pace.turn_deg_s / self.full.deg_s),
             Way::Joint => {
@@ -68,8 +68,22 @@ impl Denso {
                 (pace.flange_mm_s / fastest).min(pace.turn_deg_s / JOINTS_FULL_DEG_S)
             }
         };
-        (100.0 * share).clamp(LEAST_PERCENT, 100.0)
+        of_full(100.0 * share, pace.flange_mm_s)
     }
+}
+
+/// A share of the full speeds, as it is sent. A smaller one than the controller knows is refused: the least would be
+/// faster than what was confirmed.
+fn of_full(percent: f64, flange_mm_s: f64) -> Result<f64> {
+    // A share that is the least but for rounding is the least.
+    if !(percent >= LEAST_PERCENT * (1.0 - 1e-6)) {
+        return Err(Fault::refused(format!(
+            "{flange_mm_s:.2} mm/s is {percent:.3} % of the controller's full speed, the least is {LEAST_PERCENT} %"
+        ))
+        .cause("controllers round smaller shares to zero, and a larger one would be faster than was confirmed")
+        .next("move faster, or state a lower full speed for the link (?full=) and set the same on the controller"));
+    }
+    Ok(percent.clamp(LEAST_PERCENT, 100.0))
 }
 
 impl PoseSource for Denso {
@@ -158,7 +172,7 @@ impl Arm for Denso {
 
     fn make(&mut self, allowed: Allowed) -> Result<()> {
         let motion = allowed.motion();
-        let percent = self.percent(motion.way, allowed.pace()) as f32;
+        let percent = self.percent(motion.way, allowed.pace())? as f32;
         // By default a controller uses the square of the speed (0.25 % at 50 mm/s). Steps of less than a millimetre
         // then take as long as steps of many millimetres.
         let ramps = (2.0 * percent).clamp(LEAST_RAMP, 100.0);
@@ -186,5 +200,19 @@ impl Drop for Denso {
     fn drop(&mut self) {
         // Releases the arm for other programs; the controller does the same when the connection ends.
         let _ = self.give();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::of_full;
+
+    #[test]
+    fn a_motion_is_never_made_faster_than_it_was_confirmed() {
+        assert_eq!(of_full(0.1, 1.0).unwrap(), 0.1);
+        assert_eq!(of_full(250.0, 2500.0).unwrap(), 100.0);
+        let fault = of_full(0.01, 0.1).unwrap_err();
+        assert!(fault.what.contains("0.10 mm/s is 0.010 %") && fault.next.contains("?full="), "{fault}");
+        assert!(of_full(f64::NAN, 1.0).is_err());
     }
 }

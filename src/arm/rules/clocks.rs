@@ -40,8 +40,7 @@ impl Clocks {
         wrong.then(|| {
             format!(
                 "the controller's time went on by {:.3} s within {least:.3} to {most:.3} s, a rate of {} to {} is \
-                 allowed: \
-                 its stamps stand still or are in another unit, and speed cannot be watched",
+                 allowed: its stamps stand still or are in another unit, and speed cannot be watched",
                 passed, RATE.0, RATE.1
             )
         })

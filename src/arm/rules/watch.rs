@@ -185,8 +185,7 @@ impl<'a> Watch<'a> {
         if !(speed <= most) {
             return Some(format!(
                 "{name} moves at {speed:.0} mm/s, limit {most:.0}: the controller's full speed differs from the one \
-                 stated for the link \
-                 (?full=, ?turn=)"
+                 stated for the link (?full=, ?turn=)"
             ));
         }
         let turning = from.difference(&at).0.to_degrees() / passed;
@@ -194,8 +193,7 @@ impl<'a> Watch<'a> {
         (!(turning <= most)).then(|| {
             format!(
                 "the flange turns at {turning:.1} degrees/s, limit {most:.1}: the controller's full turning rate \
-                 differs from \
-                 the link was told (?turn=)"
+                 differs from the one stated for the link (?turn=)"
             )
         })
     }

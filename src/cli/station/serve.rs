@@ -76,6 +76,9 @@ pub struct Serve {
     /// TLS private key, PEM
     #[arg(long, requires_all = ["password_file", "tls_cert"])]
     tls_key: Option<PathBuf>,
+    /// File with a token of 20 characters or more that reads /api/v1/metrics, and nothing else
+    #[arg(long)]
+    metrics_token_file: Option<PathBuf>,
     /// Name by which browsers call this machine; may be repeated
     #[arg(long = "name", requires = "password_file")]
     names: Vec<String>,
@@ -125,6 +128,7 @@ pub fn run(args: &Serve, console: &Console) -> Result<()> {
         robot: cell.as_ref().map(SimulatedRobot::robot_uri).or(args.robot.clone()),
         may_move: args.allow_motion || cell.is_some(),
         secured,
+        metrics: args.metrics_token_file.as_deref().map(metrics_token).transpose()?,
         stop: interrupt::asked_for(),
     };
     serve(&options, cell, &random_hex(), |url, instead| {
@@ -134,6 +138,21 @@ pub fn run(args: &Serve, console: &Console) -> Result<()> {
         console.result(&serde_json::json!({ "url": url }), &said);
         console.finish()
     })
+}
+
+/// The token in a file. A short one could be guessed.
+fn metrics_token(file: &Path) -> Result<String> {
+    const LEAST: usize = 20;
+    let token = crate::files::read_text(file)?.trim().to_owned();
+    if token.len() < LEAST || !token.chars().all(|c| c.is_ascii_graphic()) {
+        return Err(Fault::usage(format!(
+            "{}: the token has {} characters, {LEAST} printable ones are the least",
+            file.display(),
+            token.len()
+        ))
+        .next("write another one, for example with: openssl rand -hex 32"));
+    }
+    Ok(token)
 }
 
 fn make(args: &Serve, console: &Console) -> Result<(PathBuf, SimulatedRobot)> {

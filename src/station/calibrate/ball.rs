@@ -106,8 +106,7 @@ fn poses_of(path: &Path) -> Result<(Vec<Rigid<Base, Flange>>, Vec<String>)> {
     if uf != 0 || ut != 0 {
         warnings.push(format!(
             "the listing's poses are those of tool frame {ut} in user frame {uf}: the result is the sensor in that \
-             tool frame; \
-             it is the flange's only if UT {ut} is zero"
+             tool frame; it is the flange's only if UT {ut} is zero"
         ));
     }
     Ok((read.into_iter().map(|p| p.pose).collect(), warnings))

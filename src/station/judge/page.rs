@@ -225,7 +225,7 @@ fn peaks(r: &ScanReport) -> Markup {
         section {
             h2 { "What became of the peaks" }
             table {
-                tr { th { "fate" } th { "peaks" } th { "share" } }
+                tr { th { "result" } th { "peaks" } th { "share" } }
                 @for (fate, &n) in rows {
                     tr { td { (fate) } td { (thousands(n)) } td { (format!("{:.3} \
                         %", 100.0 * n as f64 / all.max(1) as f64)) } }

@@ -97,8 +97,7 @@ impl Seen {
         };
         format!(
             "in {} pictures the median level is {}, the brightest {} of {}, up to {:.1} % of the pixels are \
-             saturated; the \
-             light lies {}, the laser plane is looked for {}",
+             saturated; the light lies {}, the laser plane is looked for {}",
             self.pictures,
             self.median_level,
             self.brightest_level,

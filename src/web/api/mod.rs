@@ -5,6 +5,7 @@
 mod answer;
 mod camera;
 mod jobs;
+mod metrics;
 mod motion;
 mod openapi;
 mod place;

@@ -1,7 +1,7 @@
 //! In: nothing. Out: every route of the API, in one table: the server, its description and the tests read it.
 //! Frame and unit: none.
 
-use super::{camera, jobs, motion, place, session, settings, support, surface, sweep};
+use super::{camera, jobs, metrics, motion, place, session, settings, support, surface, sweep};
 use crate::web::screen::Screen;
 use axum::routing::{MethodRouter, delete, get, post, put};
 use std::sync::Arc;
@@ -112,6 +112,12 @@ fn of_station() -> Vec<Route> {
         )
         .leased(),
         route(("GET", "/bar"), "What the bar shows", ("", "Bar"), get(place::bar)),
+        route(
+            ("GET", "/metrics"),
+            "What the bar shows, as Prometheus reads it",
+            ("", "text/plain"),
+            get(metrics::metrics),
+        ),
         route(("GET", "/boards"), "Names of the station's calibration boards", ("", ""), get(place::boards)),
         route(
             ("GET", "/support"),

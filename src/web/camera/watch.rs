@@ -6,7 +6,9 @@
 use super::lent::Lent;
 use super::state::{Looked, State, Use, lock};
 use crate::camera::Readout;
-use crate::capture::{CameraUri, Fate, Fed, Feed, FeedOptions, Mode, PictureSource, Pictures, RawFormat, now_ns};
+use crate::capture::{
+    Account, CameraUri, Fate, Fed, Feed, FeedOptions, Mode, PictureSource, Pictures, RawFormat, now_ns,
+};
 use crate::fault::{Fault, Result};
 use crate::rig::Rig;
 use crate::scan::{Live, Where};
@@ -155,6 +157,11 @@ impl Camera {
     /// Pictures a second, as it sent them lately; `None`: not known.
     pub fn rate_hz(&self) -> Option<f64> {
         lock(&self.state).rate_hz
+    }
+
+    /// What became of its pictures.
+    pub fn account(&self) -> Account {
+        lock(&self.state).account.clone()
     }
 
     /// When a picture's last byte came, ns of the host's clock; `None`: it is long gone.

@@ -21,6 +21,8 @@ pub struct Door {
     pub hosts: Hosts,
     /// Who is let in.
     pub sessions: Arc<Sessions>,
+    /// Lets a program read the figures, and nothing else.
+    pub metrics: Option<String>,
     /// Name of the cookie: of the port too, because cookies do not know ports.
     pub cookie: String,
 }
@@ -51,7 +53,7 @@ pub async fn door(
         Some((status, why)) => refusal(status, why),
         None => {
             let open = is_open(request.method(), request.uri().path());
-            match door.tab(request.headers()) {
+            match door.tab(request.headers()).or_else(|| door.scraper(&request)) {
                 Some(tab) => {
                     peer.shows_session();
                     request.extensions_mut().insert(tab);
@@ -113,14 +115,30 @@ impl Door {
     fn tab(&self, headers: &HeaderMap) -> Option<Tab> {
         let tab = headers.get("x-sheetlight-tab").and_then(|v| v.to_str().ok()).unwrap_or("none");
         let tab: String = tab.chars().filter(char::is_ascii_alphanumeric).take(32).collect();
-        let bearer =
-            headers.get(header::AUTHORIZATION).and_then(|v| v.to_str().ok()).and_then(|v| v.strip_prefix("Bearer "));
-        if bearer.is_some_and(|token| self.sessions.is_token(token)) {
+        if bearer(headers).is_some_and(|token| self.sessions.is_token(token)) {
             return Some(Tab { session: "token".into(), tab });
         }
         let session = cookie(headers, &self.cookie)?;
         self.sessions.knows(session).then(|| Tab { session: session.to_owned(), tab })
     }
+}
+
+/// Path of the figures for Prometheus.
+const METRICS: &str = "/api/v1/metrics";
+
+impl Door {
+    /// A program that has the token of the figures and asks for them.
+    fn scraper(&self, request: &Request<Body>) -> Option<Tab> {
+        let asks = request.uri().path() == METRICS && request.method() == Method::GET;
+        let (token, given) = (self.metrics.as_deref()?, bearer(request.headers())?);
+        // Hashes of both, so that the time of a comparison says nothing of the token.
+        let same = Sessions::new(token).is_token(given);
+        (asks && same).then(|| Tab { session: "metrics".into(), tab: "none".into() })
+    }
+}
+
+fn bearer(headers: &HeaderMap) -> Option<&str> {
+    headers.get(header::AUTHORIZATION)?.to_str().ok()?.strip_prefix("Bearer ")
 }
 
 fn cookie<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {

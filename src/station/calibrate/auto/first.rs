@@ -118,8 +118,7 @@ pub fn camera(stops: &[Stop], mount: Mount, size: [u32; 2]) -> Result<Intrinsics
                 })
                 .next(
                     "check tool and work number of the controller (0), that the board is fixed, and where the camera \
-                     is \
-                     (mount in station.toml)",
+                     is (mount in station.toml)",
                 )
         })
 }
