@@ -1,5 +1,4 @@
-//! In: the scenes with a stripe. Out: the cases of the stage that finds straight lines.
-//! Frame and unit: words.
+//! In: the scenes with a stripe. Out: the cases of the stage that finds straight lines. Frame and unit: words.
 
 use super::scenes::scenes;
 use super::walk::Walk;
