@@ -29,7 +29,7 @@ const LEAST = 1e-5;
 // Share of the ceiling over which the weight of clipped pixels falls to 0.
 const SOFT = 0.05;
 
-// First word of the picture; set once.
+// Index of the picture's first word; set once per invocation.
 var<private> first: u32;
 
 // Light on three lines, k pixels across from the pixel.
@@ -43,7 +43,7 @@ fn crest(at: vec2<i32>, k: i32, step: i32, beside: i32) -> i32 {
     return (lit_across(at, k - step, beside) + lit_across(at, k, beside)) + lit_across(at, k + step, beside);
 }
 
-// The pixel in the middle of a wide stripe, because its skeleton runs beside the middle.
+// The pixel in the middle of a wide stripe, whose skeleton may run beside the middle.
 fn centred(at: vec2<i32>) -> vec2<i32> {
     if frame.s0 < BROAD {
         return at;

@@ -1,5 +1,6 @@
-// In: sums of every turn. Out: the places with at least the least sum that no neighbour of the same turn exceeds, in
-// the order in which the GPU ran: turn and sum in one word, column and row in the next. Frame and unit: strided cells.
+// In: sums of every turn. Out: the places whose sum reaches the least sum and is not exceeded by a neighbour of the
+// same turn, in the order in which the GPU ran. Turn and sum are in one word, column and row in the next. Frame and
+// unit: strided cells.
 @group(0) @binding(0) var<uniform> frame: ShapeFrame;
 @group(0) @binding(1) var<storage, read> sums: array<u32>;
 // Word 3: number of places found; the first `capacity` of them are in the list.

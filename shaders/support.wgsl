@@ -46,7 +46,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             let reach = shots[shot].reach[side];
             let drop = shots[shot].drop[side];
             let end = shots[shot].end[side];
-            // First site that is not left of the reach.
+            // Binary search for the first site along the line within reach.
             var i = shots[shot].first[side];
             for (var left = end - i; left > 0u;) {
                 let half = left / 2u;

@@ -1,10 +1,11 @@
 // In: the block statistics. Out: the tiles (32 x 8) that may contain a lit pixel. Tiles that stand alone are listed
 // with the least sum of the windows around their pixels. Longer runs have up to four tiles, one below the other. The
-// number of all tiles is counted. A run never crosses from one group of four rows of tiles to the next. For every
-// block, a lower bound on the window sums around all of its pixels is computed from the blocks near it: sums of the
-// whole blocks that every window covers, and smallest rows, columns and quads for the rest. If even the block's largest
-// pixel does not pass against that bound, none of its pixels can pass against its true mean: the block is proven dark.
-// Blocks beyond the picture repeat its border. One invocation handles four tiles, which share their loads.
+// number of all tiles is counted. A run never crosses from one group of four rows of tiles to the next.
+// For every block, the blocks near it give a lower bound on the window sums around all of its pixels. The bound
+// consists of the sums of the whole blocks that every window covers, and of smallest rows, columns and quads for the
+// rest. If even the block's largest pixel does not pass against that bound, none of its pixels can pass against its
+// true mean: the block is proven dark. Blocks beyond the picture repeat its border. One invocation handles four tiles,
+// which share their loads.
 @group(0) @binding(0) var<uniform> frame: Frame;
 // The two blocks of a tile, two words each.
 @group(0) @binding(1) var<storage, read> stats: array<vec4<u32>>;

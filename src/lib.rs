@@ -1,5 +1,6 @@
-//! Sheet-of-light scanning with a robot: calibrate the camera and the line laser on its end effector, turn pictures
-//! of the stripe into point clouds in the robot's base frame, find parts in them by shape, and say where the tool goes.
+//! Sheet-of-light scanning with a robot. The library calibrates the camera and the line laser on the robot's end
+//! effector, and turns pictures of the stripe into point clouds in the robot's base frame. It finds parts in them by
+//! shape, and says where the tool goes.
 //!
 //! Every pixel of every picture is examined, by WGSL stages on a GPU or by the same arithmetic on this machine's
 //! processor. Each number comes with its standard deviation. What cannot be known is refused, not guessed.

@@ -15,7 +15,7 @@ struct Frame {
     size: u32,
     offset: i32,
     minimum: u32,
-    // ALL_TILES, HAS_ROI, GAUSSIAN.
+    // Sum of ALL_TILES, HAS_ROI and GAUSSIAN.
     flags: u32,
     // Number of the sub-iteration of thinning.
     step: u32,

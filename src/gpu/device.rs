@@ -1,5 +1,5 @@
-//! In: the adapters of this machine. Out: one opened device, its buffers, its measured transfer rates.
-//! Frame and unit: bytes, GB/s (1e9 bytes).
+//! In: the adapters of this machine. Out: one opened device and its buffers.
+//! Frame and unit: bytes.
 
 use super::alias::{self, Aliased};
 use super::background::Background;
@@ -18,7 +18,7 @@ const TIMEOUT: Duration = Duration::from_secs(60);
 pub struct AdapterInfo {
     /// As the driver gives it. SHEETLIGHT_ADAPTER is searched in it.
     pub name: String,
-    /// discrete GPU, integrated GPU, virtual GPU, CPU, other.
+    /// One of: discrete GPU, integrated GPU, virtual GPU, CPU, other.
     pub kind: String,
     /// The graphics interface: vulkan, metal or dx12.
     pub backend: String,
@@ -30,9 +30,9 @@ pub struct AdapterInfo {
     pub max_workgroup: u32,
     /// Most storage buffers that one stage can bind.
     pub storage_buffers_per_stage: u32,
-    /// GPU timestamps can be taken.
+    /// Whether GPU timestamps can be taken.
     pub timestamps: bool,
-    /// Host and device share memory that stages can read where the host writes it.
+    /// Whether host and device share memory, so that stages can read in place what the host writes.
     pub unified_memory: bool,
 }
 
@@ -51,11 +51,11 @@ pub struct Buffer {
 pub struct Device {
     pub(super) raw: wgpu::Device,
     pub(super) queue: wgpu::Queue,
-    /// The adapter it was opened on.
+    /// The adapter on which it was opened.
     pub info: AdapterInfo,
     /// Stages read arrays as texels of images on the same memory: faster on a software adapter (decision 0012).
     pub reads_texels: bool,
-    /// Nanoseconds per timestamp tick, where the adapter has timestamps.
+    /// Nanoseconds per timestamp tick; `None` if the adapter has no timestamps.
     pub(super) tick_ns: Option<f32>,
     lost: Arc<Mutex<Option<String>>>,
     /// Bytes of all buffers made through this device.
@@ -107,7 +107,7 @@ fn unified(kind: &wgpu::DeviceType, features: wgpu::Features) -> bool {
         && features.contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS)
 }
 
-/// Adapters of this machine, best first: discrete, integrated, virtual, software.
+/// Adapters of this machine, best first: discrete, integrated, virtual, other, software.
 pub fn adapters() -> Vec<AdapterInfo> {
     sorted(&instance()).iter().map(describe).collect()
 }

@@ -1,6 +1,6 @@
-//! In: pictures, one at a time. Out: their skeleton pixels, peaks and points, from the processor of this machine, in
-//! the order and with the proofs of the GPU's chain: statistics of every pixel, then only the tiles that may contain a
-//! lit pixel. Frame and unit: pixels; points in the poses' frame, mm.
+//! In: pictures, one at a time. Out: their skeleton pixels, peaks and points, computed on the processor of this
+//! machine. The order and the proofs are those of the GPU's chain: statistics of every pixel, then only the tiles that
+//! may contain a lit pixel. Frame and unit: pixels; points in the poses' frame, mm.
 
 use super::chain::config::ChainConfig;
 use super::chain::measure::Measure;

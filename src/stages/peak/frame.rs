@@ -23,9 +23,9 @@ const SPECKLED: f32 = 0.75;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct PeakFrame {
-    /// px
+    /// Width of the picture, px.
     pub width: i32,
-    /// px
+    /// Height of the picture, px.
     pub height: i32,
     /// Words of one picture row.
     pub pitch: u32,

@@ -131,7 +131,7 @@ impl Scoring<'_> {
         let h22 = e[4] + prior * (w * w);
         let (g0, g1, g2) = (r[0], r[1], r[2] + (prior * w) * (s0 - w));
         // Amplitude and then width are eliminated, the centre is last: d1 is the information about the centre alone. If
-        // there is none, as for a stripe that is clipped everywhere, rounding must not produce a certainty.
+        // there is no information, as for a stripe that is clipped everywhere, rounding must not produce a certainty.
         let (l01, l02) = (h01 / h00, h02 / h00);
         let d2 = (h22 - l02 * h02).max(LEAST * h22);
         let s12 = h12 - l02 * h01;

@@ -25,7 +25,7 @@ pub const QUADS: &str = "quads";
 const DIRECTION: &str = include_str!("../../../shaders/shared/direction.wgsl");
 const PROFILE: &str = include_str!("../../../shaders/shared/profile.wgsl");
 
-/// One peak for each skeleton pixel, and the strongest of each line across the stripe; one invocation a pixel.
+/// One peak for each skeleton pixel, and the strongest of each line across the stripe; one invocation per pixel.
 pub const STAGE: Stage = Stage {
     name: "peak",
     wgsl: include_str!("../../../shaders/peak.wgsl"),
@@ -108,11 +108,11 @@ pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     peaks[..words.len()].copy_from_slice(words);
 }
 
-/// Largest difference of two lists of peaks, in units of the limit for each number. Limits: position 0.01 px or a
-/// hundredth of its sigma, because rounding decides what the light does not determine; width 1 %, stated sigma 2 %,
-/// amplitude and background 0.5 % or a hundredth of a grey level, and the same for the strongest amplitudes. Everything
-/// else must be equal. If a number is so close to a limit that only one of the two peaks is rejected, each must have
-/// the reason that its own numbers give.
+/// Largest difference of two lists of peaks, in units of the limit for each number. The limit for a position is 0.01 px
+/// or a hundredth of its sigma, because rounding decides what the light does not determine. The other limits are: width
+/// 1 %, stated sigma 2 %, amplitude, background and strongest amplitudes 0.5 % or a hundredth of a grey level.
+/// Everything else must be equal. If a number is so close to a limit that only one of the two peaks is rejected, each
+/// must have the reason that its own numbers give.
 pub fn apart(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
     let frame = frame_of(gpu);
     let (a, b): (&[Peak], &[Peak]) = (bytemuck::cast_slice(&gpu[4]), bytemuck::cast_slice(&twin[4]));

@@ -19,7 +19,7 @@ pub use super::optics::{FLAT, Optics};
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Point {
-    /// mm
+    /// Position in the frame that the pose leads to, mm.
     pub position: Vec3,
     /// Standard deviation along the direction in which the point moves with the stripe's centre, mm. It contains the
     /// peak's own noise, not that of calibration or robot.

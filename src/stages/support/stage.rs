@@ -30,7 +30,7 @@ pub const STAGE: Stage = Stage {
     overrides: &[],
 };
 
-/// The WGSL struct of the same name.
+/// The WGSL struct of the same name, shaders/support.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct SupportFrame {
