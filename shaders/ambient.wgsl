@@ -1,5 +1,5 @@
-// In: pictures and one picture of the ambient light. Out: the pictures without it, in place, never
-// below 0. A saturated pixel stays saturated: how bright it really was is not known.
+// In: pictures and one picture of the ambient light. Out: the pictures minus the ambient light, in place, never below
+// 0. A saturated pixel stays saturated, because its true brightness is unknown.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read_write> image: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> ambient: array<vec4<u32>>;

@@ -1,4 +1,5 @@
-// In: the list of lit tiles of the previous batch. Out: what that batch wrote, zeroed; nothing else was.
+// In: the list of lit tiles of the previous batch. Out: zeros in all that the previous batch wrote, which is only in
+// these tiles.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<u32>;

@@ -1,6 +1,6 @@
-// In: every listed tile and when it last changed. Out: a new list of those whose surroundings are still
-// changing. One sub-iteration reaches one pixel, so the list with its neighbours stays complete for the
-// next 8 (a tile's height). An empty list makes the dispatches that use it empty.
+// In: every listed tile and the sub-iteration in which it last changed. Out: a new list of the tiles whose
+// neighbourhood still changes. One sub-iteration reaches one pixel, so the list with its neighbours stays complete for
+// the next 8 (a tile's height). With an empty list the dispatches that use it do nothing.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> all: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<u32>;

@@ -1,5 +1,6 @@
-// In: the quads of the threshold. Out: the mask, one word a tile row, inside the picture and the region of
-// interest only, twice: `mask` is thinned, `lit` stays; and the list of the tiles that hold a lit pixel.
+// In: the quads of the threshold. Out: the mask, one word for each row of a tile, only inside the picture and the
+// region of interest. It is written twice: `mask` is thinned, `lit` stays. Also the list of the tiles that contain a
+// lit pixel.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<vec2<u32>>;

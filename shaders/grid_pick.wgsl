@@ -1,5 +1,6 @@
-// In: span and sums of each cell. Out: the sums of one surface: both halves where they are one, else the half with more
-// points, the upper one in a tie. Twin and reasons: src/stages/grid.rs. Frame and unit: integer steps.
+// In: span and sums of each cell. Out: the sums of one surface. If the cell has one surface, that is both halves, else
+// the half with more points, the upper one in a tie. Twin and reasons: src/stages/grid.rs. Frame and unit: integer
+// steps.
 @group(0) @binding(0) var<uniform> frame: GridFrame;
 @group(0) @binding(1) var<storage, read> span: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read> layers: array<vec4<u32>>;

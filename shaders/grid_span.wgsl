@@ -1,5 +1,5 @@
-// In: points of a cloud. Out: the span of heights in each cell, as the largest height and the largest depth; 0 where
-// there is no point. Maxima do not depend on order. Twin and reasons: src/stages/grid.rs. Frame and unit: integer
+// In: points of a cloud. Out: the span of heights in each cell, as the largest height and the largest depth; 0 if the
+// cell has no point. Maxima do not depend on order. Twin and reasons: src/stages/grid.rs. Frame and unit: integer
 // height steps.
 @group(0) @binding(0) var<uniform> frame: GridFrame;
 @group(0) @binding(1) var<storage, read> records: array<u32>;

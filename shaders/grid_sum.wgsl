@@ -12,7 +12,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let at = place(frame, vec3(records[i], records[i + 1u], records[i + 2u]), bitcast<i32>(records[i + 5u]));
         if at.y > 0u {
             let s = span[at.x];
-            // Twice the height against lowest plus highest: 2 (at.y - 32768) > (32768 - s.x) + (s.y - 32768).
+            // Twice the height is compared with the sum of lowest and highest: 2 (at.y - 32768) > (32768 - s.x) + (s.y
+            // - 32768).
             let above = u32(2 * (i32(at.y) - 32768) > i32(s.y) - i32(s.x));
             let to = 8u * at.x + 4u * above;
             atomicAdd(&layers[to], 1u);

@@ -1,5 +1,5 @@
-// In: lit pixels per shot. Out: the point list's header: the arguments of a dispatch over all points, totals, and where
-// each shot's points begin.
+// In: lit pixels per shot. Out: the header of the pixel list: the arguments of a dispatch over all pixels, totals, and
+// the first entry of each shot.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> totals: array<u32>;
 @group(0) @binding(2) var<storage, read> listing: array<u32>;

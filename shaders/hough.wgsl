@@ -1,18 +1,18 @@
-// In: skeleton pixels. Out: votes for straight lines: how many pixels lie on each (angle, distance) cell.
-// The sums are whole numbers and order does not matter, so the votes are the same on every machine
-// [duda72]. Frame and unit: pixels from the picture's middle, angles of the line's normal.
+// In: skeleton pixels. Out: votes for straight lines: the number of pixels in each (angle, distance) cell. The sums are
+// whole numbers and do not depend on order, so the votes are the same on every machine [duda72]. Frame and unit: pixels
+// from the picture's middle, angles of the line's normal.
 struct HoughFrame {
     // Half the picture's size, px.
     middle_x: i32,
     middle_y: i32,
     angles: u32,
-    // Distance cells of one pixel per angle; the middle one holds distance 0.
+    // Distance cells per angle, each one pixel wide; the middle one contains distance 0.
     cells: u32,
 }
 @group(0) @binding(0) var<uniform> frame: HoughFrame;
 @group(0) @binding(1) var<storage, read> header: array<u32>;
 @group(0) @binding(2) var<storage, read> pixels: array<vec2<u32>>;
-// Cosine and sine of every angle in 1 / 16384.
+// Cosine and sine of every angle in units of 1 / 16384.
 @group(0) @binding(3) var<storage, read> table: array<vec2<i32>>;
 @group(0) @binding(4) var<storage, read_write> votes: array<atomic<u32>>;
 

@@ -1,6 +1,6 @@
-// In: pictures, skeleton, lit pixels. Out: the skeleton with its ends carried on while the light lasts. Twin and
-// reasons: src/stages/stripe/lines/lengthen.rs; here ends are found for 32 x 4 pixels at once. Frame and unit:
-// pixels; brightness relative to the end's own.
+// In: pictures, skeleton, lit pixels. Out: the skeleton with its ends lengthened as far as the stripe's light lasts.
+// Twin and reasons: src/stages/stripe/lines/lengthen.rs. Here the ends are found for 32 x 4 pixels at once. Frame and
+// unit: pixels; brightness relative to that at the end.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 @group(0) @binding(2) var<storage, read> listing: array<u32>;
@@ -12,7 +12,7 @@
 fn thin(word: u32) -> u32 {
     return mask[word / 4u][word % 4u];
 }
-// Sum of the 3x3 pixels around one.
+// Sum of the 3x3 pixels around a pixel.
 fn nine(shot: u32, x: i32, y: i32) -> u32 {
     var sum = 0u;
     for (var j = -1; j <= 1; j++) {
@@ -24,7 +24,7 @@ fn nine(shot: u32, x: i32, y: i32) -> u32 {
     return sum;
 }
 
-// Four rows of a tile: every pixel, and its neighbours to the left and to the right.
+// Four rows of a tile: every pixel, and its left and right neighbours.
 struct Rows {
     own: vec4<u32>,
     left: vec4<u32>,
@@ -34,7 +34,7 @@ fn rows(own: vec4<u32>, left: vec4<u32>, right: vec4<u32>) -> Rows {
     return Rows(own, (own << vec4(1u)) | (left >> vec4(31u)), (own >> vec4(1u)) | (right << vec4(31u)));
 }
 
-// The pixels that have one neighbour, or two on one side: not more than two steps apart on the ring of eight.
+// The pixels with one neighbour, or with two on one side: at most two steps apart on the ring of eight.
 fn ends(above: Rows, r: Rows, below: Rows) -> vec4<u32> {
     var ring = array<vec4<u32>, 8>(above.own, above.right, r.right, below.right, below.own, below.left, r.left,
         above.left);
@@ -42,7 +42,7 @@ fn ends(above: Rows, r: Rows, below: Rows) -> vec4<u32> {
         | ((ring[2] & (ring[3] | ring[4])) | (ring[3] & (ring[4] | ring[5])))
         | ((ring[4] & (ring[5] | ring[6])) | (ring[5] & (ring[6] | ring[7])))
         | ((ring[6] & (ring[7] | ring[0])) | (ring[7] & (ring[0] | ring[1])));
-    // At least one, two, three: pair by pair.
+    // At least one, two or three neighbours, combined pair by pair.
     let a = ring[0] | ring[1];
     let a2 = ring[0] & ring[1];
     let b = ring[2] | ring[3];
@@ -72,7 +72,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let shot = tile_shot(tile);
         let tx = tile_x(tile);
         let ty = tile_y(tile);
-        // The tiles around it; beyond the picture any will do, because no end is looked for there.
+        // The tiles around it. Beyond the picture any tile will do, because no end is searched there.
         let at = 2u * tile_index(tile);
         let west = at - 2u * u32(tx > 0u);
         let east = at + 2u * u32(tx + 1u < frame.tiles_x);
@@ -94,7 +94,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let after = rows(vec4(m1.yzw, bottom.y), vec4(l1.yzw, bottom.x), vec4(r1.yzw, bottom.z));
         var ends_0 = ends(before, first, middle_down);
         var ends_1 = ends(middle_up, second, after);
-        // Three pixels to every border must lie in the picture.
+        // An end must be at least three pixels from every border of the picture.
         let columns = clamp(w - 3 - i32(32u * tx), 0, 32);
         let some = (0xffffffffu >> (32u - u32(max(columns, 1)))) & select(0xfffffff8u, 0xffffffffu, tx > 0u);
         let keep = select(0u, some, columns > 0);
@@ -110,7 +110,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
                 var ax = 0;
                 var ay = 0;
                 for (var j = -3; j <= 3; j++) {
-                    // Seven pixels, which may reach into the next tile.
+                    // Seven pixels, which may extend into the next tile.
                     let word = mask_word(shot, u32(x - 3), u32(y + j));
                     let next = mask_word(shot, u32(x + 3), u32(y + j));
                     let by = u32(x - 3) & 31u;

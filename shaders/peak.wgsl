@@ -1,7 +1,7 @@
-// Fits one peak at each skeleton pixel of a batch. A peak that fails a test of its own gets the reason for rejection.
-// Of the others the strongest on each line across the stripe is noted, for the comparison in point.wgsl. Units: pixels,
-// grey levels. Twin: src/stages/peak/fit.rs, across/centre.rs, across/direction.rs, profile.rs, scoring.rs,
-// methods.rs and stripe/choose.rs, which explains the reasons; docs/math.md, Stripe peak (0) to (5).
+// Fits one peak at each skeleton pixel of a batch. A peak that fails a test needing no other peak gets the reason for
+// rejection. The strongest of the others on each line across the stripe is stored for the comparison in point.wgsl.
+// Units: pixels, grey levels. Twin: src/stages/peak/fit.rs, across/centre.rs, across/direction.rs, profile.rs,
+// scoring.rs, methods.rs and stripe/choose.rs, which explains the reasons; docs/math.md, Stripe peak (0) to (5).
 @group(0) @binding(0) var<uniform> frame: PeakFrame;
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 @group(0) @binding(2) var<storage, read> header: array<u32>;
@@ -9,30 +9,30 @@
 @group(0) @binding(4) var<storage, read_write> peaks: array<Peak>;
 @group(0) @binding(5) var<storage, read_write> strongest: array<atomic<u32>>;
 
-// Pixels a word as a power of two: 2 for 8-bit pictures, 1 for deeper ones.
+// Pixels per word as a power of two: 2 for 8-bit pictures, 1 for deeper ones.
 override px_log2: u32 = 2u;
-// 0 Gaussian, 1 centroid, 2 derivative, 3 the pixel itself.
+// Method: 0 Gaussian, 1 centroid, 2 derivative, 3 the skeleton pixel itself.
 override peak_method: u32 = 0u;
 
 // Distance from the centre within which the light is a narrow stripe's own, px.
 const BESIDE = 4;
 // The skeleton of a stripe narrower than this runs close enough to its middle, px.
 const BROAD = 4.5;
-// Limit for the squared difference of two sides of one level, in variances of a pixel over the pixels of a side.
+// Limit for the squared difference of two sides of one level, in units of a pixel's variance over the pixels of a side.
 const BY_NOISE = 8.0;
 // Largest uncertainty from sides of different levels, as a share of the amplitude.
 const UNEVEN = 0.06;
-// Grey levels that count as no light. The square must not be denormal, because a CPU is many times slower then.
+// Grey levels that count as no light. Their square must not be denormal, because a CPU is many times slower then.
 const DARK = 1e-9;
 // Least share of a parameter's information that remains when another parameter explains it.
 const LEAST = 1e-5;
-// Share of the saturation level over which the weight of clipped pixels falls to 0.
+// Share of the ceiling over which the weight of clipped pixels falls to 0.
 const SOFT = 0.05;
 
-// First word of the picture; set once.
+// Index of the picture's first word; set once per invocation.
 var<private> first: u32;
 
-// Light on three lines, k pixels across.
+// Light on three lines, k pixels across from the pixel.
 fn lit_across(at: vec2<i32>, k: i32, beside: i32) -> i32 {
     let along = select(vec2(0, beside), vec2(beside, 0), frame.columns > 0u);
     let p = at + k * select(vec2(1, 0), vec2(0, 1), frame.columns > 0u);
@@ -43,7 +43,7 @@ fn crest(at: vec2<i32>, k: i32, step: i32, beside: i32) -> i32 {
     return (lit_across(at, k - step, beside) + lit_across(at, k, beside)) + lit_across(at, k + step, beside);
 }
 
-// The pixel in the middle of a wide stripe, because its skeleton runs beside the middle.
+// The pixel in the middle of a wide stripe, whose skeleton may run beside the middle.
 fn centred(at: vec2<i32>) -> vec2<i32> {
     if frame.s0 < BROAD {
         return at;
@@ -68,13 +68,13 @@ fn centred(at: vec2<i32>) -> vec2<i32> {
     return clamp(p, vec2(0), vec2(frame.width - 1, frame.height - 1));
 }
 
-// Square of the difference between the two sides' levels, minus their noise.
+// Squared difference between the two sides' levels, minus their noise.
 var<private> uneven2: f32;
 fn background(x: i32, y: i32, n: vec2<f32>) -> f32 {
     let start = i32(floor(4.0 * frame.s0 + 0.5));
     let end = start + max(i32(floor(2.0 * frame.s0 + 0.5)), 2);
     let along = 1.2 * frame.s0;
-    // Not 0.5: at slopes of 1 in 32 and the like rounding would decide.
+    // Not 0.5, so that rounding errors do not decide at slopes such as 1 in 32.
     let tu = i32(floor(along * n.y + 0.47));
     let tv = i32(floor(0.47 - along * n.x));
     var low = 0.0;
@@ -94,7 +94,7 @@ fn background(x: i32, y: i32, n: vec2<f32>) -> f32 {
     return darker;
 }
 
-// Light above the background, by pairs of samples, and the samples that take part.
+// Light above the background, for pairs of samples; and the span of samples that take part.
 var<private> light: array<vec2<f32>, 20>;
 var<private> base: f32;
 var<private> near: vec2<f32>;
@@ -123,8 +123,8 @@ fn guess(profile: Profile) -> vec2<f32> {
     return vec2(m, max(1.25 * all / max(count, 1e-6), 1.0));
 }
 
-// Where the centre lies that is m across from the pixel: in the middle of the window there. It is on the line, however
-// the direction errs.
+// Place in the picture of a centre that is m px across from the pixel: the middle of the window there. It is on the
+// line even if the direction has an error.
 fn centre_at(at: vec2<i32>, m: f32) -> vec2<f32> {
     let a = walk.lean * (m / walk.nb);
     let b = (m - a * walk.na) / walk.nb;
@@ -160,7 +160,7 @@ fn window_pair(j: i32) {
     }
 }
 
-// e to the power of x from -80 to 80, as the twin has it.
+// e to the power of x from -80 to 80, with the twin's arithmetic.
 fn exponential(x: vec2<f32>) -> vec2<f32> {
     let t = clamp(x * 1.442695, vec2(-120.0), vec2(120.0));
     let whole = floor(t + vec2(0.5));
@@ -170,7 +170,7 @@ fn exponential(x: vec2<f32>) -> vec2<f32> {
     return p * bitcast<vec2<f32>>(vec2<u32>(vec2<i32>(whole) + vec2(127)) << vec2(23u));
 }
 
-// The model at a pair of samples and what leads to the next pair.
+// The model at a pair of samples, and the factors that lead to the next pair.
 var<private> model: vec2<f32>;
 var<private> ratio: vec2<f32>;
 var<private> fall: f32;
@@ -178,14 +178,14 @@ var<private> fall: f32;
 var<private> narrow: f32;
 var<private> z: vec2<f32>;
 var<private> dz: vec2<f32>;
-// Variance without light, what light adds to it, the model's light at full scale.
+// Variance without light, and the terms that light adds to it; the model's light at full scale.
 var<private> quiet: f32;
 var<private> gain: f32;
 var<private> speckle2: f32;
 var<private> ceiling: f32;
 var<private> soft: f32;
-// Sums over certainty times model squared times z^0, z^1, .. z^4; certainty, residual, model and z^0, z^1, z^2;
-// certainty and residual squared; weights.
+// Sums over certainty times model squared times z^0, z^1, .. z^4; certainty times residual times model times z^0, z^1,
+// z^2; the squared residuals; the weights that counted.
 var<private> e0: vec2<f32>;
 var<private> e1: vec2<f32>;
 var<private> e2: vec2<f32>;
@@ -202,7 +202,7 @@ fn fit_pair(j: i32) {
         let above = clamp(soft * (model - vec2(ceiling)) + vec2(0.5), vec2(0.0), vec2(1.0));
         let silent = above * lost[j];
         let heard = max(vec2(1.0) - silent, vec2(1e-3));
-        // The model of a sample that is off the others' steps or wider, to second order.
+        // The model of a sample that lies off its step or is wider, to second order.
         let stray = stray_pair(j);
         let there = model * ((vec2(1.0) - z * (stray * narrow)) + (z * z - vec2(1.0)) * (spread_pair(j, stray)
             * (0.5 * (narrow * narrow))));
@@ -265,8 +265,8 @@ fn gaussian(at: vec2<i32>) -> Peak {
         let z0 = (profile.offset - m) * inverse;
         z = vec2(z0, z0 - wide);
         dz = vec2(wide, -wide);
-        // A Gaussian at equal steps: its ratio from sample to sample falls by a constant factor. From the middle to
-        // both sides, because what has become 0 stays 0.
+        // A Gaussian at equal steps: its ratio from sample to sample falls by a constant factor. The steps run from the
+        // middle to both sides, because a model value that has become 0 stays 0.
         model = a * exponential(-0.5 * (z * z));
         ratio = exponential(-0.5 * (dz * dz) - dz * z);
         fall = exponential(vec2(-(wide * wide))).x;
@@ -306,7 +306,7 @@ fn gaussian(at: vec2<i32>) -> Peak {
         let dm = clamp(width * x1, -0.7 * s0, 0.7 * s0);
         let dw = clamp(width * x2, -0.3 * s0, 0.3 * s0);
         i11 = (width * width) / d1;
-        // Subtract what this step lowers the squares by, because they are needed at the end of the fit.
+        // Subtract the decrease of the squares by this step: the squares after the last step are needed.
         drop = (g0 * (da / a) + g1 * (dm / width)) + g2 * (dw / width);
         a = max(a + da, 1.0);
         m = clamp(m + dm, m0 - 2.0 * s0, m0 + 2.0 * s0);
@@ -349,7 +349,7 @@ fn centroid(at: vec2<i32>) -> Peak {
     let m0 = guess(profile).x;
     near = span(profile, m0, 3.0 * frame.s0);
     quiet = frame.read2 + frame.gain * base;
-    // In samples.
+    // Unit: samples.
     z = vec2((m0 - profile.offset) / profile.step);
     sum = vec2(0.0);
     moment = vec2(0.0);
@@ -406,7 +406,7 @@ fn derivative(at: vec2<i32>) -> Peak {
     return finish(vec2<f32>(c) + m * n, n, max(bright, 1.0), width, sqrt(noise) / max(-d2, 1e-6), saturated);
 }
 
-// The standard deviation if nothing shows in which part of the pixel the centre lies.
+// Standard deviation of a centre that may lie anywhere in its pixel, px.
 const EVEN = 0.28867513;
 
 fn itself(at: vec2<i32>) -> Peak {
@@ -416,7 +416,7 @@ fn itself(at: vec2<i32>) -> Peak {
     return finish(vec2<f32>(at), n, max(here - base, 1.0), frame.s0, EVEN, here >= frame.full_scale);
 }
 
-// The first test that fails names the reason.
+// The first test that fails determines the reason.
 fn alone(k: Peak) -> u32 {
     let across = k.normal_u * frame.across_u + k.normal_v * frame.across_v;
     var why = 0u;
@@ -434,7 +434,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let at = vec2(i32(point.x & 0xffffu), i32(point.x >> 16u));
         first = point.y * frame.shot_words;
         var peak: Peak;
-        // The method is a constant of the pipeline: the others are not in its code.
+        // The method is a constant of the pipeline, so the compiled code has only one method.
         if peak_method == 0u {
             peak = gaussian(centred(at));
         } else if peak_method == 1u {

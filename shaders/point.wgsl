@@ -51,12 +51,12 @@ struct PointFrame {
 @group(0) @binding(4) var<storage, read_write> peaks: array<Peak>;
 @group(0) @binding(5) var<storage, read_write> points: array<vec4<f32>>;
 
-// 1: the lens has terms beside Brown-Conrady's five, or its sensor is tilted.
+// 1: the lens has terms beyond Brown-Conrady's five, or its sensor is tilted.
 override full_lens: u32 = 0u;
 
 const NEWTON = 5u;
 
-// The reason for rejecting a peak, compared with the strongest peaks of the lines nearby.
+// The reason for rejecting a peak from a comparison with the strongest peaks of the lines nearby, or 0.
 fn beside(k: Peak) -> u32 {
     let along = i32(line_of(k.pixel));
     let low = max(along - frame.echo_reach, 0);
@@ -80,7 +80,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let k = peaks[id.x];
         let yv = (k.v - frame.cy) / frame.fy;
         let xv = (k.u - frame.cx - frame.skew * yv) / frame.fx;
-        // One pixel along the peak's normal.
+        // Change of the ray for one pixel along the peak's normal.
         let dv = k.normal_v / frame.fy;
         let du = (k.normal_u - frame.skew * dv) / frame.fx;
         var xd = xv;
@@ -88,7 +88,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         var dxd = du;
         var dyd = dv;
         if full_lens == 1u {
-            // Off the tilted sensor.
+            // From the tilted sensor to a sensor that is not tilted.
             let w = frame.t6 * xv + (frame.t7 * yv + frame.t8);
             xd = (frame.t0 * xv + (frame.t1 * yv + frame.t2)) / w;
             yd = (frame.t3 * xv + (frame.t4 * yv + frame.t5)) / w;
@@ -136,7 +136,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let slope = frame.normal_x * x + (frame.normal_y * y + frame.normal_z);
         let z = frame.offset / slope;
         let there = det > 0.0 && a + d > 0.0 && abs(x) < 1e9 && abs(y) < 1e9 && slope > 1e-6 && z < 1e6;
-        // dx, dy of the ray, dz from the plane.
+        // dx and dy come from the ray, dz from the plane.
         let dz = -z * (frame.normal_x * dx + frame.normal_y * dy) / slope;
         let mx = dz * x + z * dx;
         let my = dz * y + z * dy;
@@ -144,7 +144,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let p = vec3(x * z, y * z, z);
         let spot = vec4(row(poses[3u * k.shot], p), row(poses[3u * k.shot + 1u], p), row(poses[3u * k.shot + 2u],
             p), sigma);
-        // The first reason stays.
+        // The first reason is kept.
         let alone = k.flags & REASON;
         let compared = select(alone, beside(k), alone == 0u);
         let why = select(compared, NO_POINT, compared == 0u && !there);

@@ -1,4 +1,5 @@
-// In: the stamps of a round of sub-iterations after which some tiles still change. Out: none: another round begins.
+// In: the stamps of a round of sub-iterations after which some tiles still change. Out: stamps of 0, with which another
+// round begins.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<u32>;

@@ -1,6 +1,6 @@
-// In: the lists' headers of the previous batch. Out: empty lists; at a further round of thinning (step 1)
-// the lists of tiles that may be lit, and of those that are, stay. Headers are HEADER_WORDS apart. Each of those
-// has a buffer of its own: no buffer can be both read for the size of a dispatch and written by it.
+// In: the lists' headers of the previous batch. Out: empty lists. In a further round of thinning (step 1) the list of
+// tiles that may be lit and the list of lit tiles stay. Headers are HEADER_WORDS apart. Those two lists have separate
+// buffers, because no buffer can both give the size of a dispatch and be written by it.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read_write> first: array<u32>;
 @group(0) @binding(2) var<storage, read_write> lit_first: array<u32>;

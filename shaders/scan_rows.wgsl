@@ -1,4 +1,5 @@
-// In: lit pixels per tile. Out: per tile how many lie before it in its row of tiles, and each row's total.
+// In: lit pixels per tile. Out: for each tile the number of lit pixels before it in its row of tiles, and each row's
+// total.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> counts: array<u32>;
 @group(0) @binding(2) var<storage, read_write> starts: array<u32>;

@@ -1,4 +1,4 @@
-// In: lit pixels per row of tiles. Out: how many lie before each row in its shot, and each shot's total.
+// In: lit pixels per row of tiles. Out: the number of lit pixels before each row in its shot, and each shot's total.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> rows: array<u32>;
 @group(0) @binding(2) var<storage, read_write> row_starts: array<u32>;

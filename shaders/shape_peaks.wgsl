@@ -1,9 +1,9 @@
-// In: sums of every turn. Out: the places that reach the least sum and that no neighbour of the same turn exceeds, in
-// whatever order the GPU ran: turn and sum in one word, column and row in the next.
-// Frame and unit: strided cells.
+// In: sums of every turn. Out: the places whose sum reaches the least sum and is not exceeded by a neighbour of the
+// same turn, in the order in which the GPU ran. Turn and sum are in one word, column and row in the next. Frame and
+// unit: strided cells.
 @group(0) @binding(0) var<uniform> frame: ShapeFrame;
 @group(0) @binding(1) var<storage, read> sums: array<u32>;
-// Word 3: how many there were, of which the first `capacity` are in the list.
+// Word 3: number of places found; the first `capacity` of them are in the list.
 @group(0) @binding(2) var<storage, read_write> header: array<atomic<u32>>;
 @group(0) @binding(3) var<storage, read_write> hits: array<vec2<u32>>;
 

@@ -1,5 +1,5 @@
-// In: the thinned mask and the scanned counts. Out: its pixels as a list (x | y << 16, shot), in the order
-// of the tiles, always the same, cut at the list's capacity.
+// In: the thinned mask and the prefix sums of its counts. Out: its pixels as a list (x | y << 16, shot), ordered by
+// tile and therefore always the same, cut at the list's capacity.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<u32>;

@@ -1,4 +1,4 @@
-// In: the skeleton. Out: its listed tiles once more, to be added to. Frame and unit: one bit a pixel.
+// In: the skeleton. Out: a copy of its listed tiles, to which pixels are added. Frame and unit: one bit per pixel.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<u32>;

@@ -1,6 +1,6 @@
-// Thins the skeleton across the stripe. A run is a row of skeleton pixels within `spacing` of each other. Of each run
-// the middle pixel stays, and from it every pixel at a multiple of `spacing`. Isolated lit pixels are removed.
-// Twin and reasons: src/stages/stripe/lines/spacing.rs.
+// Thins the skeleton across the stripe. A run is a row of skeleton pixels within `spacing` of each other. The middle
+// pixel of each run stays, and every pixel at a multiple of `spacing` from it. Isolated lit pixels are removed. Twin
+// and reasons: src/stages/stripe/lines/spacing.rs.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<u32>;
@@ -8,8 +8,8 @@
 @group(0) @binding(4) var<storage, read> mask: array<u32>;
 @group(0) @binding(5) var<storage, read_write> spaced: array<u32>;
 
-// Pixels of the run beyond one of its pixels, on one side (a mask of lines that were carried on may hold another
-// batch's where nothing is lit); FAR if the run has no end within FAR pixels.
+// Pixels of the run beyond one of its pixels, on one side; FAR if the run has no end within FAR pixels. Where nothing
+// is lit, the mask of lengthened lines may contain pixels of another batch, so only lit pixels count.
 fn beyond(shot: u32, x: i32, y: i32, across: vec2<i32>) -> i32 {
     let step = i32(frame.spacing & 0xffffu);
     var found = 0;
@@ -41,12 +41,12 @@ fn kept(shot: u32, x: i32, y: i32) -> bool {
     return place % i32(frame.spacing & 0xffffu) == 0;
 }
 
-// Whether another pixel near one is lit, where that is asked for.
+// Whether another pixel close to this one is lit; true if the setting does not require it.
 fn in_company(shot: u32, x: i32, y: i32) -> bool {
     if (frame.spacing & COMPANY) == 0u {
         return true;
     }
-    // Columns that lie in one word or in two beside each other; where they begin with a word, they lie in one.
+    // The columns lie in one word or in two neighbouring words; if they begin at a word's start, they lie in one.
     let first = u32(max(x - NEAR, 0));
     let last = u32(min(x + NEAR, i32(frame.width) - 1));
     let wanted = (1u << (last - first + 1u)) - 1u;
@@ -81,9 +81,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     }
 }
 
-// A run that goes on for longer has no middle that can be found from here: its pixels are counted from the picture's
-// border.
+// If a run continues for longer than this, its middle cannot be found from here: its pixels are counted from the
+// picture's border.
 const FAR: i32 = 32;
-// A lit pixel without another one this close, in columns and rows, is not a stripe's; the setting's bit for it.
+// A lit pixel without another one within NEAR columns and rows does not belong to a stripe. COMPANY is the setting's
+// bit for removing it.
 const NEAR: i32 = 3;
 const COMPANY: u32 = 0x20000u;

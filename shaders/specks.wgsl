@@ -1,7 +1,7 @@
-// Handles the tiles that stand alone in the list, each with the least sum of the windows around its pixels. A tile
-// with one candidate pixel against that sum is finished here, in both masks and the list of lit tiles. A tile with
-// more becomes a run of one. In noise most listed tiles have one candidate, and one window's sum is half the work of
-// the tile's.
+// Handles the tiles that stand alone in the list, each with the least sum of the windows around its pixels. A tile with
+// one pixel that may pass against that sum is finished here, in both masks and the list of lit tiles. A tile with more
+// such pixels becomes a run of one tile. In noise most listed tiles have one candidate, and one window's sum is half
+// the work of the tile's.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> image: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> listing: array<u32>;
@@ -15,21 +15,21 @@
 @group(0) @binding(9) var<storage, read_write> run_listing: Listing;
 @group(0) @binding(10) var<storage, read_write> runs: array<vec2<u32>>;
 
-// Half the window's edge, less a half: a constant, so that the loops over a row are written out.
+// The window's edge is 2 radius + 1. A constant, so that the loops over a row are unrolled.
 override radius: u32 = 15u;
 
-// Loads that hold a row of a window, wherever it begins.
+// Loads that contain a row of a window, wherever it begins.
 fn loads() -> u32 {
     return (2u * radius + 2u * per_load() - 1u) / per_load();
 }
 
-// Number of candidates, and sum of their places in the tile: x + 32 y.
+// Number of candidates, and sum of their positions in the tile: x + 32 y.
 struct Candidates {
     count: vec4<u32>,
     place: vec4<u32>,
 }
 
-// Pixels of the tile that are at least as bright.
+// Pixels of the tile with at least this brightness.
 fn candidates(own: u32, top: i32, brightness: i32) -> Candidates {
     let last_row = i32(frame.height) - 1;
     let bits = 32u >> px_log2;
@@ -58,7 +58,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let pitch = frame.pitch / 4u;
         let picture = tile_shot(tile) * (frame.shot_words / 4u);
         let area = frame.size * frame.size;
-        // n^2 (value - offset) > sum + (n^2 - 1) / 2, as in `threshold`, for the least sum.
+        // n^2 (value - offset) > sum + (n^2 - 1) / 2, as in `threshold`, with the least sum.
         let passing = i32(divide((single.y << depth_shift()) + (area - 1u) / 2u, area)) + frame.offset + 1;
         let own = picture + tile_x(tile) * (32u / per_load());
         let found = candidates(own, i32(8u * tile_y(tile)), max(passing, i32(frame.minimum)));
@@ -71,7 +71,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
                 atomicAdd(&run_listing.groups, 1u);
             }
         }
-        // Meaningless where there is none or several: any pixel of the tile.
+        // Without meaning if there is no candidate or more than one: then it is any pixel of the tile.
         let column = place & 31u;
         let row = (place >> 5u) & 7u;
         let x = i32(32u * tile_x(tile) + column);
@@ -89,7 +89,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let word = image[own + u32(min(y, last_row)) * pitch + column / per_load()][(column % per_load()) >> px_log2];
         let bits = 32u >> px_log2;
         let value = (word >> ((column & ((1u << px_log2) - 1u)) * bits)) & ((1u << bits) - 1u);
-        // One alone lies in the picture: beyond its border the same pixel repeats, in the same tile.
+        // A single candidate lies in the picture: beyond the border the border pixel repeats in the same tile and would
+        // count too.
         var passes = count == 1u && i32(area) * (i32(value) - frame.offset) > i32(sum + (area - 1u) / 2u);
         let bit = 1u << column;
         if (frame.flags & HAS_ROI) != 0u {

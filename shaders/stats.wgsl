@@ -1,7 +1,7 @@
 // In: pictures. Out: per block of 16 x 8 pixels its sum, its largest and smallest pixel, and its smallest sums of a
-// row, of a column and of a quad (2 x 2 pixels): what `tiles` needs to prove that it holds no lit pixel.
-// The only pass that touches every pixel: 16 pixels a load, four pixels an addition. Deeper pictures are
-// given in 256ths of their full scale, rounded to the safe side: largest up, all else down.
+// row, of a column and of a quad (2 x 2 pixels). From these `tiles` proves that a block contains no lit pixel. This is
+// the only pass that reads every pixel: 16 pixels per load, four pixels per addition. Values of deeper pictures are in
+// 256ths of their full scale, rounded to the safe side: the largest up, all others down.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> image: array<vec4<u32>>;
 // (sum | largest << 15 | smallest << 24, smallest row sum | smallest column sum << 12 | half the smallest quad << 23)
@@ -20,7 +20,8 @@ fn block8(first: u32, top: u32) -> vec2<u32> {
     var even = vec4(0u); // columns 0 and 2 of each word, 16 bits each
     var odd = vec4(0u); // columns 1 and 3
     var row_least = 0xffffffffu;
-    // The top half or byte of the largest word is the largest of the top halves or bytes, and so for the smallest.
+    // The top half or byte of the largest word is the largest of the top halves or bytes. The same holds for the
+    // smallest.
     var quads = vec4(0xffffffffu);
     var m0 = vec4(0u);
     var m1 = vec4(0u);
@@ -102,7 +103,7 @@ fn block16(first: u32, top: u32) -> vec2<u32> {
         d += u1;
         let pairs_v = v0 + v1;
         let pairs_u = u0 + u1;
-        // The first row of a pair is kept, the second completes the quads.
+        // The first row of a pair is stored, the second completes the quads.
         let complete = vec4((r & 1u) == 1u);
         quads = min(quads, select(quads, min(above_v + pairs_v, above_u + pairs_u), complete));
         above_v = pairs_v;

@@ -1,7 +1,7 @@
-// In: peaks of some shots with their points, the points of the shots beside them in order along the laser line. Out:
-// each peak's flags; kept ones with too few neighbours there carry the reason. Whole numbers, so that every machine
-// counts the same neighbours. Twin and reasons: src/stages/support/stage.rs. Frame and unit: base frame, 2^-14 mm;
-// grey levels; px.
+// In: peaks of some shots with their points, and the points of the neighbouring shots in order along the laser line.
+// Out: each peak's flags; peaks that were kept but have too few neighbours there get the reason. Whole numbers, so that
+// every machine counts the same neighbours. Twin and reasons: src/stages/support/stage.rs. Frame and unit: base frame,
+// 2^-14 mm; grey levels; px.
 struct SupportFrame {
     peaks: u32,
     sure: f32,
@@ -13,7 +13,7 @@ struct SupportFrame {
     reserved_2: u32,
 }
 
-// What a shot's peaks need, and where its two neighbours lie in the list of sites.
+// The numbers for a shot's peaks, and where the points of its two neighbouring shots are in the list of sites.
 struct Neighbourhood {
     first: array<u32, 2>,
     end: array<u32, 2>,
@@ -27,7 +27,7 @@ struct Neighbourhood {
 
 @group(0) @binding(0) var<uniform> frame: SupportFrame;
 @group(0) @binding(1) var<storage, read> shots: array<Neighbourhood>;
-// x, y, z and the place along the line.
+// x, y, z and the position along the line.
 @group(0) @binding(2) var<storage, read> sites: array<vec4<i32>>;
 @group(0) @binding(3) var<storage, read> places: array<vec4<i32>>;
 @group(0) @binding(4) var<storage, read> peaks: array<Peak>;
@@ -46,7 +46,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             let reach = shots[shot].reach[side];
             let drop = shots[shot].drop[side];
             let end = shots[shot].end[side];
-            // First site that is not left of the reach.
+            // Binary search for the first site along the line within reach.
             var i = shots[shot].first[side];
             for (var left = end - i; left > 0u;) {
                 let half = left / 2u;

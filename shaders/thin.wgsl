@@ -1,6 +1,6 @@
-// In: the mask before a sub-iteration. Out: the mask after it, in the listed tiles, and a stamp on those that changed:
-// 32 pixels a word, the 8 words of a tile an invocation [zhang84], [guo89].
-// The border rows and columns of the picture are never deleted, as in OpenCV.
+// In: the mask before a sub-iteration. Out: the mask after it, in the listed tiles, and a stamp on those that changed.
+// Words of 32 pixels, one invocation for the 8 words of a tile [zhang84], [guo89]. The border rows and columns of the
+// picture are never deleted, as in OpenCV.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<u32>;
@@ -8,7 +8,7 @@
 @group(0) @binding(4) var<storage, read_write> after: array<vec4<u32>>;
 @group(0) @binding(5) var<storage, read_write> stamps: array<u32>;
 
-// Exactly one of the bits given one after the other; `more` collects the rest.
+// `one` collects whether any of the bits added was set, `more` whether more than one was.
 struct Count {
     one: vec4<u32>,
     more: vec4<u32>,
@@ -27,7 +27,7 @@ fn zhang_suen(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: ve
     a = add(a, ~p7 & p8);
     a = add(a, ~p8 & p9);
     a = add(a, ~p9 & p2);
-    // Three full adders: neighbours counted in b0 + 2 b1 + 4 b2 (8 wraps to 0, which is refused too).
+    // Three full adders: the number of neighbours is b0 + 2 b1 + 4 b2 (8 wraps to 0, which is refused too).
     let s1 = p2 ^ p3 ^ p4;
     let c1 = (p2 & p3) | (p4 & (p2 ^ p3));
     let s2 = p5 ^ p6 ^ p7;
@@ -62,7 +62,7 @@ fn guo_hall(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: vec4
     return c.one & ~c.more & n1 & n2 & ~(all1 & all2) & ~stays;
 }
 
-// 0 Zhang-Suen, 1 Guo-Hall: a constant, so that the other rule is not in the code.
+// 0 Zhang-Suen, 1 Guo-Hall: a constant, so that the compiled code has only one rule.
 override rule: u32 = 0u;
 
 fn gone_of(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: vec4<u32>, p7: vec4<u32>, p8: vec4<u32>,
@@ -82,14 +82,14 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let x = tile_x(tile);
         let y = tile_y(tile);
         let pitch = frame.tiles_x;
-        // Tiles beyond the picture are dark: their place is the tile's own, their bits are cleared.
+        // Tiles beyond the picture are dark: their index is the tile's own, their bits are cleared.
         let to_left = select(0u, 1u, x > 0u);
         let to_right = select(0u, 1u, x + 1u < pitch);
         let above = at - select(0u, pitch, y > 0u);
         let below = at + select(0u, pitch, y + 1u < frame.tiles_y);
         let up_bits = select(0u, 0xffffffffu, y > 0u);
         let down_bits = select(0u, 0xffffffffu, y + 1u < frame.tiles_y);
-        // Rows 0 to 3 and 4 to 7 of the tile; the last bit of its left, the first of its right neighbour.
+        // Rows 0 to 3 and 4 to 7 of the tile; the last bit of its left and the first of its right neighbour.
         let here0 = before[2u * at];
         let here1 = before[2u * at + 1u];
         let left0 = (before[2u * (at - to_left)] >> vec4(31u)) & vec4(to_left);
@@ -110,7 +110,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let up_east = (up >> 1u) | up_right;
         let down_west = (down << 1u) | down_left;
         let down_east = (down >> 1u) | down_right;
-        // Clockwise from north; what is north of rows 1 to 3 are rows 0 to 2, and so on.
+        // Neighbours clockwise from north. North of rows 1 to 3 are rows 0 to 2, and so on.
         var gone0 = gone_of(
             vec4(up, here0.xyz), vec4(up_east, east0.xyz), east0, vec4(east0.yzw, east1.x),
             vec4(here0.yzw, here1.x), vec4(west0.yzw, west1.x), west0, vec4(up_west, west0.xyz));
@@ -128,8 +128,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         gone1 &= here1 & select(vec4(0u), vec4(deletable), row1 + vec4(1u) < last);
         after[2u * at] = here0 & ~gone0;
         after[2u * at + 1u] = here1 & ~gone1;
-        // Only its own: shortening the list looks at the stamps around, eight stores here would cost a third of the
-        // stage.
+        // Only the tile's own stamp: `compact` reads the neighbours' stamps, because eight more stores here would cost
+        // a third of the stage.
         let both = gone0 | gone1;
         if ((both.x | both.y) | (both.z | both.w)) != 0u {
             stamps[at] = frame.step + 3u;

@@ -1,8 +1,8 @@
-// In: pictures, a list of runs of tiles. Out: the pixels brighter than the mean of the window around them, inside the
-// picture and the region of interest only, twice: `mask` is thinned, `lit` stays; and the list of the tiles that
-// hold one, which all later stages work on. One invocation a run: the sums of the columns that its
-// windows touch are carried down its rows, four words of pixels a load. The radius is a constant of the pipeline, so
-// that every index is one too.
+// In: pictures, a list of runs of tiles. Out: the pixels brighter than the mean of the window around them, only inside
+// the picture and the region of interest. They are written twice: `mask` is thinned, `lit` stays. Also the list of
+// tiles that contain a lit pixel, on which all later stages work. One invocation per run: it carries the sums of the
+// columns of its windows down the run's rows, four words of pixels per load. The radius is a constant of the pipeline,
+// so that every index is constant too.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> image: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> listing: array<u32>;
@@ -14,9 +14,9 @@
 @group(0) @binding(7) var<storage, read_write> lit_listing: Listing;
 @group(0) @binding(8) var<storage, read_write> lit_list: array<u32>;
 
-// Half the window's edge, less a half.
+// The window's edge is 2 radius + 1.
 override radius: u32 = 15u;
-// Loads on each side of the tile, and in all.
+// Loads on each side of the tile, and in total.
 fn beside() -> u32 {
     return (radius + per_load() - 1u) / per_load();
 }
@@ -45,7 +45,7 @@ fn begin() -> u32 {
     return beside() * per_load() - radius;
 }
 
-// The window's sum moves on by one pixel: the last column enters, the pixel is compared, the first leaves.
+// Moves the window's sum by one pixel: the last column enters, the pixel is compared, the first column leaves.
 var<private> sum: i32;
 var<private> bits: u32;
 fn pixel_step(i: u32, area: i32) {
@@ -54,7 +54,7 @@ fn pixel_step(i: u32, area: i32) {
     bits |= select(0u, 1u << i, area * i32(value) > sum && value >= frame.minimum);
     sum -= i32(column(begin() + i));
 }
-// Written out, because Mesa leaves a loop of 32 as it is, and an index that is not constant costs 10 cycles.
+// Unrolled by hand: Mesa does not unroll a loop of 32, and an index that is not constant costs 10 cycles.
 fn eight_steps(i: u32, area: i32) {
     pixel_step(i, area);
     pixel_step(i + 1u, area);

@@ -1,5 +1,5 @@
-// In: pictures and a list of tiles, each a run of one. Out: as `threshold`, with Gaussian weights: along the row
-// first, then down the rows, f32, both in ascending order as the twin does.
+// In: pictures and a list of tiles, each a run of one. Out: as `threshold`, with Gaussian weights: first along the row,
+// then down the rows, in f32, both in ascending order as in the twin.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 @group(0) @binding(2) var<storage, read> listing: array<u32>;
@@ -27,7 +27,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let top = i32(8u * tile_y(tile));
         for (var q = 0u; q < 8u; q++) {
             let x = i32(32u * tile_x(tile) + 4u * q);
-            // One accumulator a row of the tile; each blurred row enters all the windows that hold it.
+            // One accumulator for each row of the tile; each blurred row enters all the windows that contain it.
             var sums = array<vec4<f32>, 8>();
             for (var y = -r; y < 8 + r; y++) {
                 let row = blurred(row_start(shot, top + y), x, r);

@@ -1,15 +1,16 @@
-// In: the block statistics. Out: the tiles (32 x 8) that may hold a lit pixel: those that stand alone, with the least
-// sum of the windows around their pixels; longer runs of up to four, one below the other; and how many there are.
-// Runs begin anew at every fourth row of tiles.
-// For every block a lower bound on the window sums around all of its pixels is put together from the blocks near it:
-// whole ones that every window covers, and smallest rows, columns and quads for the rest. Where even the block's
-// largest pixel does not pass against that bound, none of its pixels can pass against its true mean: the
-// block is proven dark. Blocks beyond the picture repeat its border. Four tiles an invocation share their loads.
+// In: the block statistics. Out: the tiles (32 x 8) that may contain a lit pixel. Tiles that stand alone are listed
+// with the least sum of the windows around their pixels. Longer runs have up to four tiles, one below the other. The
+// number of all tiles is counted. A run never crosses from one group of four rows of tiles to the next.
+// For every block, the blocks near it give a lower bound on the window sums around all of its pixels. The bound
+// consists of the sums of the whole blocks that every window covers, and of smallest rows, columns and quads for the
+// rest. If even the block's largest pixel does not pass against that bound, none of its pixels can pass against its
+// true mean: the block is proven dark. Blocks beyond the picture repeat its border. One invocation handles four tiles,
+// which share their loads.
 @group(0) @binding(0) var<uniform> frame: Frame;
 // The two blocks of a tile, two words each.
 @group(0) @binding(1) var<storage, read> stats: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> roi: array<vec4<u32>>;
-// Only its count.
+// Only the count is used.
 @group(0) @binding(3) var<storage, read_write> listing: Listing;
 @group(0) @binding(4) var<storage, read_write> single_listing: Listing;
 // (tile, least sum in 256ths of full scale)
@@ -18,16 +19,16 @@
 // (first tile, number of tiles)
 @group(0) @binding(7) var<storage, read_write> runs: array<vec2<u32>>;
 
-// Half the window's edge, less a half; constants, so that rows which no window reaches are not in the code.
+// The window's edge is 2 radius + 1. A constant, so that the compiled code has no rows that no window reaches.
 override radius: u32 = 15u;
-// 1: the window has weights, only the smallest pixel bounds its mean; and every tile is listed as one alone.
+// 1: the window has weights. Then only the smallest pixel bounds its mean, and every tile is listed as standing alone.
 override weighted: u32 = 0u;
 
 const NONE = vec4(0xffffffffu);
 const ROWS = vec4(0, 1, 2, 3);
 
-// How the windows of all pixels of a block lie over blocks of `edge` pixels, along one axis: blocks up to `full` away
-// are covered whole, `rest` pixels more lie in the blocks beyond them up to `reach` away.
+// How the windows of all pixels of a block cover blocks of `edge` pixels, along one axis. Blocks up to `full` away are
+// covered whole. `rest` more pixels lie in the blocks beyond them, up to `reach` away.
 fn full(edge: i32) -> i32 {
     let r = i32(radius);
     return select(-1, (r - edge + 1) / edge, r >= edge - 1 && weighted == 0u);
@@ -39,8 +40,9 @@ fn rest(edge: i32) -> u32 {
     return 2u * radius + 1u - u32(select(0, edge * (2 * full(edge) + 1), full(edge) >= 0));
 }
 
-// What a column of blocks gives to the windows around four of its blocks, a component each: sums of what they cover
-// whole, of the block and of its smallest column; the smallest row, pixel and half quad of what they cover in part.
+// Contribution of a column of blocks to the windows around four of its blocks, one component for each. For blocks that
+// the windows cover whole: the sum of their sums, and of their smallest columns. For blocks covered in part: the
+// smallest row, pixel and half quad.
 struct Band {
     sum: vec4<u32>,
     column: vec4<u32>,
@@ -50,7 +52,7 @@ struct Band {
 }
 const EMPTY = Band(vec4(0u), vec4(0u), NONE, NONE, NONE);
 
-// One more block, `dy` rows of blocks below the first of the four; its words as in `stats`.
+// Adds a block that is `dy` rows of blocks below the first of the four; its words are as in `stats`.
 fn more(b: Band, block: vec2<u32>, dy: i32, beyond: bool) -> Band {
     let smallest = block.x >> 24u;
     let row = block.y & 0xfffu;
@@ -69,8 +71,8 @@ fn more(b: Band, block: vec2<u32>, dy: i32, beyond: bool) -> Band {
     );
 }
 
-// Four tiles, one below the other: the column of the first, the row of it in its shot, the shot's first row of tiles
-// and last row.
+// Four tiles, one below the other: the column of tiles, the row of the first tile in its shot, the shot's first row of
+// tiles and its last row.
 struct Strip {
     x: i32,
     y: i32,
@@ -78,12 +80,12 @@ struct Strip {
     last: i32,
 }
 
-// The bands of a column of tiles: its left and its right blocks.
+// The bands of a column of tiles: of its left and its right blocks.
 struct Bands {
     left: Band,
     right: Band,
 }
-// One row of blocks of the column of tiles `x`; where that lies beside the picture, the border's blocks repeat.
+// Adds one row of blocks of the column of tiles `x`; if it lies beyond the picture, the border's blocks repeat.
 fn add_row(bands: ptr<function, Bands>, strip: Strip, x: i32, dy: i32) {
     let y = strip.y + dy;
     let near_x = clamp(x, 0, i32(frame.tiles_x) - 1);
@@ -93,7 +95,8 @@ fn add_row(bands: ptr<function, Bands>, strip: Strip, x: i32, dy: i32) {
     (*bands).right = more((*bands).right, select(s.zw, s.xy, x < near_x), dy, y != near_y);
 }
 
-// What the windows around a block get from the columns of blocks near it, four blocks below each other at once.
+// Contribution of the columns of blocks near a block to the windows around it, for four blocks below each other at
+// once.
 struct Near {
     sum: vec4<u32>,
     column: vec4<u32>,
@@ -104,7 +107,7 @@ const NOTHING = Near(vec4(0u), NONE, NONE, NONE);
 fn join(n: Near, b: Band, away: i32, beyond: bool) -> Near {
     let whole = vec4(away <= full(16));
     let part = vec4(away <= reach(16)) & !whole;
-    // Beyond the border its smallest column repeats sixteen times, its smallest pixel four times.
+    // Beyond the border the block's smallest column repeats sixteen times, and its smallest pixel four times.
     let column = b.column + rest(8) * b.smallest;
     let sum = select(b.sum + rest(8) * b.row, column << vec4(4u), vec4(beyond));
     let quad = select(b.quad, b.smallest << vec4(1u), vec4(beyond));
@@ -116,14 +119,14 @@ fn join(n: Near, b: Band, away: i32, beyond: bool) -> Near {
     );
 }
 
-// What the windows around both blocks of a tile get.
+// Contributions to the windows around both blocks of a tile.
 struct Around {
     left: Near,
     right: Near,
 }
-// The column of tiles `dx` beside the strip. Its rows and the columns are written out: Mesa leaves a loop as it is, and
-// half of this is constant. Those that no window reaches are left out where they are called, before Mesa sees them
-// (decision 0015); a radius of 50 reaches 7 rows of blocks and 2 columns of tiles.
+// Adds the column of tiles `dx` beside the strip. Its rows, and the columns, are unrolled by hand: Mesa does not unroll
+// the loop, and half of this is constant. Rows and columns that no window reaches are excluded at the call, before Mesa
+// sees them (decision 0015). A radius of 50 reaches 7 rows of blocks and 2 columns of tiles.
 fn add_column(around: ptr<function, Around>, strip: Strip, dx: i32) {
     let x = strip.x + dx;
     var bands = Bands(EMPTY, EMPTY);
@@ -168,14 +171,14 @@ fn add_column(around: ptr<function, Around>, strip: Strip, dx: i32) {
 
 // The least sum of the windows around four blocks.
 fn least_sum(n: Near) -> vec4<u32> {
-    // What is covered in part in both directions holds, on both sides together, this many whole quads.
+    // The area covered in part in both directions contains this many whole quads, on both sides together.
     let quads = ((rest(16) - 1u) / 2u) * ((rest(8) - 1u) / 2u);
     let singles = rest(16) * rest(8) - 4u * quads;
     let sum = n.sum + rest(16) * n.column + 2u * quads * n.quad + singles * n.smallest;
     return select(sum, frame.size * frame.size * n.smallest, vec4(weighted != 0u));
 }
 
-// Blocks whose largest pixel may pass against that; it lies in the first word of the statistics.
+// Blocks whose largest pixel may pass against that sum. The largest pixel is in the first word of the statistics.
 fn passes(words: vec4<u32>, sum: vec4<u32>) -> vec4<bool> {
     let area = i32(frame.size * frame.size);
     let deep = vec4(depth_shift());
@@ -217,7 +220,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let sum_right = least_sum(around.right);
         let least = min(sum_left, sum_right);
         var lit = passes(vec4(s0.x, s1.x, s2.x, s3.x), sum_left) | passes(vec4(s0.z, s1.z, s2.z, s3.z), sum_right);
-        // The plain path rests on no bound.
+        // The plain path uses no bound: it lists all tiles.
         let all = (frame.flags & ALL_TILES) != 0u;
         lit |= vec4(all);
         lit &= vec4(i32(y)) + ROWS <= vec4(last);

@@ -1,8 +1,9 @@
-//! Sheet-of-light scanning with a robot: calibrate the camera and the line laser on its end effector, turn pictures
-//! of the stripe into point clouds in the robot's base frame, find parts in them by shape, and say where the tool goes.
+//! Sheet-of-light scanning with a robot. The library calibrates the camera and the line laser on the robot's end
+//! effector, and turns pictures of the stripe into point clouds in the robot's base frame. It finds parts in them by
+//! shape, and says where the tool goes.
 //!
-//! Every pixel of every picture is looked at, by WGSL stages on a GPU or by the same arithmetic on this machine's
-//! processor. Each number comes with its standard deviation; what is not known is refused, not guessed.
+//! Every pixel of every picture is examined, by WGSL stages on a GPU or by the same arithmetic on this machine's
+//! processor. Each number comes with its standard deviation. What cannot be known is refused, not guessed.
 //!
 //! A recording becomes a cloud, a height map and a page to look at:
 //!
@@ -20,17 +21,18 @@
 //!
 //! `examples/` has four small programs: scan a recording, one picture to points, calibrate a camera, find a part.
 //!
-//! **Conventions.** Millimetres, radians and `f64` unless a name says otherwise (`angle_deg`, `peak_px`); an integer
-//! pixel is a pixel's centre; a transform `a_from_b` takes points of frame b to frame a, and the frames are types
-//! ([`geometry::Rigid`]). Bad input is a [`fault::Fault`]: what happened with its number and limit, the likely cause,
-//! the next step.
+//! **Conventions.** Millimetres, radians and `f64` unless a name says otherwise (`angle_deg`, `peak_px`). An integer
+//! pixel coordinate is a pixel's centre. A transform `a_from_b` takes points of frame b to frame a, and the frames are
+//! types ([`geometry::Rigid`]). Bad input is a [`fault::Fault`]: what happened with its number and limit, the likely
+//! cause, the next step.
 //!
-//! **Features.** `cli` (default) is the command line with clap and indicatif and all else, `bench` what it measures,
-//! `gige` cameras that speak GigE Vision, `cell` the simulated cell, `ros` scans as MCAP files with ROS 2 messages,
-//! `web` the operator's screen; a program that uses the library takes what it wants: `default-features = false`.
+//! **Features.** `cli` (default) is the command line with clap and indicatif, and turns all other features on. `bench`
+//! has the measurements of `sheetlight bench`, `gige` the cameras that speak GigE Vision, and `cell` the simulated
+//! cell. `ros` writes scans as MCAP files with ROS 2 messages. `web` is the operator's screen. A program that uses the
+//! library sets `default-features = false` and chooses what it needs.
 //!
-//! The modules stand in floor order; each imports only from floors above it in this list (ARCHITECTURE.md, enforced by
-//! tests/floors.rs).
+//! The modules are listed in the order of their floors; each imports only from floors above it in this list
+//! (ARCHITECTURE.md, enforced by tests/floors.rs).
 
 #![warn(missing_docs)]
 

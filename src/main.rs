@@ -1,8 +1,9 @@
 //! In: the command line. Out: an exit code.
 //! Frame and unit: none.
 
-/// A search's layers are many megabytes that come and go: what keeps them at hand, instead of handing each back to
-/// the system, searches in two thirds of the time (benches/runs/2026-11-27-2core-epyc, "Memory that comes and goes").
+/// A search allocates and frees layers of many megabytes. An allocator that keeps this memory, instead of returning it
+/// to the system each time, searches in two thirds of the time (benches/runs/2026-11-27-2core-epyc, "Memory that comes
+/// and goes").
 #[global_allocator]
 static MEMORY: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

@@ -1,7 +1,7 @@
-// A stamp holds 3 + the sub-iteration in which a tile last changed, 0 for never. What follows from pixels that did not
-// change in the last two sub-iterations (both parities of the rule) does not change either, so a tile goes on only
-// while its own stamp or one beside it is that fresh.
-// The latest stamp of a tile and its eight neighbours:
+// A stamp is 3 + the sub-iteration in which a tile last changed, or 0 if it never did. If neither a tile nor a
+// neighbour changed in the last two sub-iterations (both parities of the rule), the tile cannot change any more. So a
+// tile stays in the list only while its own stamp or a neighbour's is that recent. This is the latest stamp of a tile
+// and its eight neighbours:
 fn latest(tile: u32) -> u32 {
     let x = i32(tile_x(tile));
     let y = i32(tile_y(tile));

@@ -1,13 +1,13 @@
-// Sums of columns of pixels: rows enter them four words a load. Wants `frame`, `image` as vectors of four words, and
-// `px_log2`.
+// Sums over columns of pixels; rows are added with four words per load. Needs `frame`, `image` as vectors of four
+// words, and `px_log2`.
 
 // Pixels in four words.
 fn per_load() -> u32 {
     return 4u << px_log2;
 }
 
-// Two vectors a load: of its even and of its odd columns. In 8-bit pictures each word carries two sums of 16 bits:
-// 101 * 255 fits. At most 18 loads: 16 bits and a radius of 50.
+// Two vectors per load: the sums of its even and of its odd columns. In 8-bit pictures each word holds two sums of 16
+// bits: 101 * 255 fits. At most 18 loads: 16 bits and a radius of 50.
 var<private> sums: array<vec4<u32>, 36>;
 
 fn low() -> u32 {
@@ -17,7 +17,7 @@ fn half() -> u32 {
     return select(16u, 8u, px_log2 == 2u);
 }
 
-// Four words of a row; words beyond the row repeat its border pixel.
+// Four words of a row; beyond the row the border pixel repeats.
 fn four(row: u32, i: i32) -> vec4<u32> {
     let last = i32(frame.pitch / 4u) - 1;
     let v = image[row + u32(clamp(i, 0, last))];
@@ -28,14 +28,14 @@ fn four(row: u32, i: i32) -> vec4<u32> {
     return select(select(v, vec4(left), i < 0), vec4(right), i > last);
 }
 
-// The first `loads` sums are emptied.
+// Sets the first `loads` sums to zero.
 fn clear_sums(loads: u32) {
     for (var i = 0u; i < 2u * loads; i++) {
         sums[i] = vec4(0u);
     }
 }
 
-// A row of pixels enters the sums (sign 1) or leaves them (sign -1).
+// Adds a row of pixels to the sums (sign 1) or subtracts it (sign -1).
 fn pass_row(row: u32, first: i32, loads: u32, sign: u32) {
     for (var i = 0u; i < loads; i++) {
         let v = four(row, first + i32(i));
@@ -44,7 +44,7 @@ fn pass_row(row: u32, first: i32, loads: u32, sign: u32) {
     }
 }
 
-// All bits where a column, counted from the first one loaded, is one of `n` from `begin` on.
+// All bits set for each column, counted from the first one loaded, that is one of `n` from `begin` on.
 fn chosen(c: vec4<u32>, begin: u32, n: u32) -> vec4<u32> {
     return select(vec4(0u), vec4(0xffffffffu), c >= vec4(begin) & c < vec4(begin + n));
 }

@@ -1,9 +1,9 @@
 // In: a picture, a skeleton pixel. Out: the unit vector across the stripe there. Twin and reasons:
 // src/stages/peak/across/direction.rs; docs/math.md, Stripe peak (1). Frame and unit: pixels.
 
-// Directions that are taken in turn beside a border.
+// Most directions computed in turn beside a border.
 const BORDER_STEPS = 2u;
-// From this share of its direction on a stripe counts as leaving the picture there.
+// A stripe counts as leaving the picture if at least this share of its direction points out of it.
 const LEAVES = 0.3;
 
 fn whole(x: i32, y: i32) -> i32 {
@@ -18,18 +18,20 @@ fn level(x: i32, y: i32) -> f32 {
     return f32(whole(x, y));
 }
 
-// Weights (1 - r^2 / 16)^2 in 64ths of gradients one step away along both axes; two along one; two along both; none.
+// Weights (1 - r^2 / 16)^2 in 64ths of the gradients one step away along both axes; two steps along one; two along
+// both; at the pixel.
 const ONE = 49;
 const TWO = 36;
 const FAR = 16;
 const NONE = 64;
 
-// How much the rig's direction counts beside the gradients, for the square of how much worse than a straight stripe's
-// they agree.
+// Weight of the rig's direction against that of the gradients. It is multiplied by the square, minus 1, of how much
+// worse the gradients agree than on a straight stripe.
 const DISUNITED = 0.04;
 
-// The structure tensor from 13 gradients on 24 grey levels, every other place of a lattice, in whole numbers: half
-// the difference of its diagonal, the other element, half the difference of its eigenvalues and half their sum.
+// The structure tensor from 13 gradients on 24 grey levels, at every other place of a lattice, in whole numbers.
+// Returns half the difference of its diagonal, the other element, half the difference of its eigenvalues and half their
+// sum.
 fn tensor(x: i32, y: i32, u: i32, v: i32) -> vec4<f32> {
     let a = vec3(whole(x - 2 * u, y - 3 * v), whole(x, y - 3 * v), whole(x + 2 * u, y - 3 * v));
     let b = vec4(whole(x - 3 * u, y - 2 * v), whole(x - u, y - 2 * v), whole(x + u, y - 2 * v), whole(x + 3 * u,
@@ -40,11 +42,11 @@ fn tensor(x: i32, y: i32, u: i32, v: i32) -> vec4<f32> {
     let f = vec4(whole(x - 3 * u, y + 2 * v), whole(x - u, y + 2 * v), whole(x + u, y + 2 * v), whole(x + 3 * u, y
         + 2 * v));
     let g = vec3(whole(x - 2 * u, y + 3 * v), whole(x, y + 3 * v), whole(x + 2 * u, y + 3 * v));
-    // Ten bits a gradient.
+    // Ten bits per gradient.
     let deep = max(countOneBits(u32(frame.full_scale)), 10u) - 10u;
     let half = vec4(i32((1u << deep) >> 1u));
     let by = vec4(deep);
-    // In the rows two above, of the pixel, two below; then the diagonals.
+    // Gradients in the row two above, in the pixel's row and in the row two below; then the diagonals.
     let ax = ((b.yzw - b.xyz) + half.xyz) >> by.xyz;
     let ay = ((c - a) + half.xyz) >> by.xyz;
     let rx = ((d.yzw - d.xyz) + half.xyz) >> by.xyz;
@@ -66,7 +68,7 @@ fn tensor(x: i32, y: i32, u: i32, v: i32) -> vec4<f32> {
     return vec4(h, xy, sqrt(h * h + xy * xy), 0.5 * (xx + yy));
 }
 
-// Sine and cosine of twice the angle that a tensor shows.
+// Sine and cosine of twice the angle of a tensor's direction.
 fn twice(t: vec4<f32>) -> vec2<f32> {
     return vec2(t.y, -t.x) / vec2(max(t.z, 1e-12));
 }
@@ -78,7 +80,7 @@ fn turn_of(sc: vec2<f32>, c: vec4<f32>) -> f32 {
     return c.x * sc.x + (c.y * s4 + (c.z * (s4 * sc.y + c4 * sc.x) + c.w * (2.0 * (s4 * c4))));
 }
 
-// Across the stripe. Corrects the error that differences over this distance make in the direction.
+// Direction across the stripe. Corrects the error that differences over this distance make in the direction.
 fn direction_at(x: i32, y: i32) -> vec2<f32> {
     var t = tensor(x, y, frame.lattice_u, frame.lattice_v);
     let seen = twice(t);
@@ -94,14 +96,16 @@ fn direction_at(x: i32, y: i32) -> vec2<f32> {
     let q = t.z;
     let m = select(vec2(xy, q - h), vec2(h + q, xy), h > 0.0);
     let n = vec2(m.x + turn * m.y, m.y - turn * m.x);
-    // Twice the angle: what the gradients say, and the rig, the more of it the less they agree.
+    // The direction at twice its angle: that of the gradients plus that of the rig, which has more weight the less the
+    // gradients agree.
     let other = (t.w - q) / (frame.ragged * (t.w + q) + frame.restless);
     let own = 2.0 * q / (t.w + q);
     let length2 = n.x * n.x + n.y * n.y;
     let own2 = vec2(2.0 * n.x * n.y, n.y * n.y - n.x * n.x) / vec2(length2);
     let across = vec2(frame.across_u, frame.across_v);
     let rig2 = vec2(2.0 * across.x * across.y, across.y * across.y - across.x * across.x);
-    // Less of it where the stripe lies more than 45 degrees off, and none at 90: that is no edge's doing.
+    // The rig's weight falls if the stripe is more than 45 degrees off the rig's direction, to 0 at 90: no edge causes
+    // that.
     let near = min(1.0 + (own2.x * rig2.x + own2.y * rig2.y), 1.0);
     let rig = DISUNITED * max(other * other - 1.0, 0.0) * near;
     let sine = own * own2.x + rig * rig2.x;
@@ -123,11 +127,12 @@ fn inward(x: i32, y: i32, n: vec2<f32>) -> vec2<i32> {
     let by_u = select(0.0, f32(du) / t.x, abs(t.x) >= LEAVES);
     let by_v = select(0.0, f32(dv) / t.y, abs(t.y) >= LEAVES);
     let along = select(by_v, by_u, abs(by_u) >= abs(by_v));
-    // Not 0.5: rounding would decide.
+    // Not 0.5, so that rounding errors do not decide.
     return vec2(x + i32(floor(along * t.x + 0.47)), y + i32(floor(along * t.y + 0.47)));
 }
 
-// Beside the picture's border that of the stripe's next piece whose differences lie in the picture.
+// Direction across the stripe. Beside the picture's border it is that of the stripe's next piece whose differences lie
+// in the picture.
 fn direction(x: i32, y: i32) -> vec2<f32> {
     var n = direction_at(x, y);
     for (var i = 0u; i < BORDER_STEPS; i++) {

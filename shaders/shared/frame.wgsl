@@ -1,7 +1,7 @@
-// What every stage of the stripe chain knows: the size of the pictures, how they lie in memory, and
-// the settings. Pictures of one batch lie behind each other ("shots"). A picture's rows are padded to
-// whole tiles of 32 pixels by repeating the last pixel; masks hold one bit a pixel, the 8 words of a tile
-// (one a row) behind each other, and have their height padded to whole tiles of 8 rows with zeros.
+// The block that every stage of the stripe chain reads: the size of the pictures, their layout in memory, and the
+// settings. The pictures of one batch ("shots") are stored one after the other. A picture's rows are padded to whole
+// tiles of 32 pixels by repeating the last pixel. Masks have one bit per pixel. The 8 words of a tile (one for each
+// row) are stored one after the other, and the mask's height is padded to whole tiles of 8 rows with zeros.
 struct Frame {
     width: u32,
     height: u32,
@@ -15,17 +15,17 @@ struct Frame {
     size: u32,
     offset: i32,
     minimum: u32,
-    // ALL_TILES, HAS_ROI, GAUSSIAN.
+    // Sum of ALL_TILES, HAS_ROI and GAUSSIAN.
     flags: u32,
-    // Number of thinning's sub-iteration.
+    // Number of the sub-iteration of thinning.
     step: u32,
-    // Most skeleton pixels of a batch.
+    // Most skeleton pixels in a batch.
     capacity: u32,
     full_scale: u32,
-    // Ends of skeletons: most pixels added, and from bit 16 on the share of brightness in 4096ths.
+    // Lengthening of skeleton ends: most pixels added, and from bit 16 on the share of brightness in 4096ths.
     lengthen: u32,
-    // Pixels from one of a run across the stripe to the next, and from bit 16 on 1 where runs lie along rows; 0 keeps
-    // all.
+    // Distance between the pixels of a run across the stripe that stay, px; from bit 16 on, 1 if runs lie along rows. 0
+    // keeps all.
     spacing: u32,
 }
 
@@ -34,10 +34,10 @@ const ALL_TILES = 1u;
 const HAS_ROI = 2u;
 const GAUSSIAN = 4u;
 
-// Pixels a word as a power of two: 2 for 8-bit pictures, 1 for 9 to 16 bits.
+// Pixels per word as a power of two: 2 for 8-bit pictures, 1 for 9 to 16 bits.
 override px_log2: u32 = 2u;
 
-// Arguments of an indirect dispatch with one invocation a tile and 64 a workgroup, and the list's length.
+// Arguments of an indirect dispatch with one invocation per tile and 64 per workgroup; and the list's length.
 struct Listing {
     groups: atomic<u32>,
     groups_y: u32,
@@ -58,19 +58,19 @@ fn tile_y(tile: u32) -> u32 {
 fn tile_shot(tile: u32) -> u32 {
     return tile >> 22u;
 }
-// Place of a tile in arrays that hold every tile.
+// Index of a tile in arrays that contain every tile.
 fn tile_index(tile: u32) -> u32 {
     return (tile_shot(tile) * frame.tiles_y + tile_y(tile)) * frame.tiles_x + tile_x(tile);
 }
-// Place of a tile's row in a mask.
+// Index of a tile's row in a mask.
 fn mask_index(tile: u32, row: u32) -> u32 {
     return 8u * tile_index(tile) + row;
 }
-// Place of a pixel's word in a mask; its bit is x % 32.
+// Index of a pixel's word in a mask; its bit is x % 32.
 fn mask_word(shot: u32, x: u32, y: u32) -> u32 {
     return 8u * ((shot * frame.tiles_y + y / 8u) * frame.tiles_x + x / 32u) + y % 8u;
 }
-// Bits beyond eight of the pictures' depth.
+// Number of bits by which the pictures' depth exceeds eight.
 fn depth_shift() -> u32 {
     return countOneBits(frame.full_scale) - 8u;
 }

@@ -1,5 +1,5 @@
-// What the stages grid_span, grid_sum and grid_pick know, and where a point of the cloud lies: whole numbers only, so
-// that every machine fills the same cells. The fields are explained beside the struct of the same name,
+// The block of the stages grid_span, grid_sum and grid_pick, and the computation of a point's cell: only with whole
+// numbers, so that every machine fills the same cells. The fields are explained at the struct of the same name in
 // src/stages/grid.rs.
 struct GridFrame {
     width: u32,
@@ -32,12 +32,12 @@ struct GridFrame {
     reserved: u32,
 }
 
-// Words of one point in the cloud, and the largest fixed-point magnitude.
+// Words of one point in the cloud; the largest fixed-point magnitude; the largest height.
 const RECORD = 9u;
 const BEYOND = 0x20000000;
 const Z_MOST = 32767;
 
-// The bits of an f32 as a multiple of 2^-places, rounded; what is too large, or no number, is BEYOND.
+// The bits of an f32 as a multiple of 2^-places, rounded. A number that is too large, and NaN, give BEYOND.
 fn fixed(bits: u32, places: i32) -> i32 {
     let exponent = i32((bits >> 23u) & 255u);
     let mantissa = (bits & 0x7fffffu) | 0x800000u;
@@ -50,7 +50,7 @@ fn fixed(bits: u32, places: i32) -> i32 {
     return select(value, -value, bits >> 31u == 1u);
 }
 
-// 64-bit two's complement as (low, high).
+// Product as a 64-bit two's complement (low, high).
 fn product(a: i32, b: i32) -> vec2<u32> {
     let x = u32(abs(a));
     let y = u32(abs(b));
@@ -69,7 +69,7 @@ fn plus(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
     return vec2(low, a.y + b.y + u32(low < a.x));
 }
 
-// Floor of v / 2^s, s in 1..=62, where it fits 32 bits.
+// Floor of v / 2^s, s in 1..=62, if it fits 32 bits.
 fn shifted(v: vec2<u32>, s: u32) -> i32 {
     let low = bitcast<i32>((v.y << ((32u - s) & 31u)) | (v.x >> (s & 31u)));
     return select(low, bitcast<i32>(v.y) >> ((s - 32u) & 31u), s >= 32u);
@@ -79,7 +79,7 @@ fn coordinate(d: vec3<i32>, row: vec3<i32>, add: vec2<u32>, shift: u32) -> i32 {
     return shifted(plus(plus(product(d.x, row.x), product(d.y, row.y)), plus(product(d.z, row.z), add)), shift);
 }
 
-// Cell, and height + Z_MOST + 1; the second is 0 outside the grid.
+// Index of the cell, and height + Z_MOST + 1; the second is 0 outside the grid.
 fn place(f: GridFrame, p: vec3<u32>, quality: i32) -> vec2<u32> {
     let q = vec3(fixed(p.x, 14), fixed(p.y, 14), fixed(p.z, 14));
     let d = q - vec3(f.origin_x, f.origin_y, f.origin_z);

@@ -1,10 +1,12 @@
-// Words of a list's header: the arguments of an indirect dispatch over all entries, 64 a workgroup, and their number.
+// Words of a list's header: the arguments of an indirect dispatch over all entries, 64 per workgroup, and the number of
+// entries.
 const GROUPS = 0u;
 const GROUPS_Y = 1u;
 const GROUPS_Z = 2u;
 const COUNT = 3u;
-// Further words of the pixel list's header: pixels found, of which COUNT are listed; tiles that were looked at
-// closely; shortened lists of thinning that still held a tile; pictures; the first pixel of every picture, and the end.
+// Further words of the pixel list's header. FOUND: pixels found, of which COUNT are listed. LISTED: tiles that may be
+// lit. LEFT: shortened lists of thinning that still contained a tile. SHOTS: pictures. STARTS: the first pixel of every
+// picture, and the end.
 const FOUND = 4u;
 const LISTED = 5u;
 const LEFT = 6u;

@@ -1,5 +1,5 @@
-// What the stages lines and peak know: pictures, stripe, noise, limits of a peak by itself.
-// The fields are explained beside the struct of the same name, src/stages/peak/frame.rs.
+// The block of the stages lines and peak: pictures, stripe, noise, limits of a single peak. The fields are explained at
+// the struct of the same name in src/stages/peak/frame.rs.
 struct PeakFrame {
     width: i32,
     height: i32,
@@ -58,7 +58,8 @@ struct Peak {
     shot: u32,
 }
 
-// Flags of a peak: in the lowest byte why it was refused, 0 where it was not; a bit where one of its pixels is clipped.
+// Flags of a peak: the lowest byte is the reason for rejection, 0 if it was not rejected; SATURATED if one of its
+// pixels is clipped.
 const REASON = 255u;
 const FAINT = 2u;
 const NARROW = 3u;

@@ -2,22 +2,23 @@
 // Twin and reasons: src/stages/peak/profile.rs; docs/math.md, Stripe peak (2). Frame and unit: offsets from the
 // skeleton pixel, px; grey levels.
 //
-// Work on every sample is written out as calls with constant arguments, so that samples are registers: an array with an
-// index that is known only at run time lies in memory, which Mesa's software adapter reads and writes lane by lane, and
-// other adapters behind their caches. What reads pixels stays a loop, because the whole text has to fit 32 KiB of
-// instruction cache: one workgroup walks through all of it.
+// Work on every sample is unrolled by hand into calls with constant arguments, so that samples are in registers. An
+// array with an index that is known only at run time is in memory, which Mesa's software adapter reads and writes lane
+// by lane, and other adapters through their caches. Code that reads pixels stays a loop, because the whole text must
+// fit into 32 KiB of instruction cache: one workgroup runs through all of it.
 
-// A profile's samples by four; sample k lies at k + 2 quads.
+// A profile's samples by four; sample k is stored at index k + 2 quads.
 override quads: i32 = 10;
-// Levels, the shares of clipped pixels' weights, offsets from the samples' nominal places, their variances.
+// Levels, the clipped shares of the weights, offsets from the samples' nominal places, and the variances of the pixels
+// about them.
 var<private> levels: array<vec4<f32>, 10>;
 var<private> sums: array<vec4<f32>, 10>;
 var<private> strays: array<vec4<f32>, 10>;
 var<private> spreads: array<vec4<f32>, 10>;
-// What samples are off on average: at sample 0, by how much more from one to the next; their variance.
+// Average offset of the samples: at sample 0, and its increase from one to the next; the average variance.
 var<private> usual: vec3<f32>;
 struct Profile {
-    // First and last sample that lies in the picture; sample k is `offset + k step` off.
+    // First and last sample that lie in the picture; sample k is `offset + k step` from the skeleton pixel.
     low: f32,
     high: f32,
     offset: f32,
@@ -27,7 +28,8 @@ struct Profile {
     blur2: f32,
 }
 
-// Columns where the stripe is nearer to the horizontal, else rows; at 45 degrees rounding shall not decide.
+// True (columns) if the stripe is closer to the horizontal, else rows. The factor keeps rounding from deciding at 45
+// degrees.
 fn by_columns(n: vec2<f32>) -> bool {
     return 1.001 * n.y >= abs(n.x);
 }
@@ -36,26 +38,26 @@ fn floor_div(a: i32, b: i32) -> i32 {
     return (a - select(0, b - 1, a < 0)) / b;
 }
 
-// A window that would move by less than this from row to row, px, stands still.
+// A window that would move by less than this from row to row, px, does not move.
 const STILL = 0.05;
 
-// The window of a profile: a counts along the image axis that the stripe is nearer to, b across it.
+// The window of a profile: a counts along the image axis that the stripe is closer to, b across it.
 struct Walk {
     columns: bool,
     a0: i32,
     b0: i32,
     na: f32,
     nb: f32,
-    // By how much the window's middle moves along a from row to row.
+    // Shift of the window's middle along a from row to row.
     lean: f32,
-    // How far from the pixel of the middle a pixel may lie.
+    // Largest distance of a pixel from the pixel in the window's middle.
     room: i32,
     fade: f32,
 }
 var<private> walk: Walk;
 
-// Sums over the pixels of four samples side by side: weighted levels, weights, those of clipped pixels, squared
-// weights; weights times offset from the sample's nominal one, and times its square.
+// Sums over the pixels of four samples side by side: weighted levels, weights, weights of clipped pixels, squared
+// weights; weights times the offset from the sample's nominal place, and times its square.
 var<private> lit: vec4<u32>;
 var<private> weights: vec4<u32>;
 var<private> full: vec4<u32>;
@@ -63,12 +65,13 @@ var<private> squares_of: vec4<u32>;
 var<private> offsets: vec4<f32>;
 var<private> offsets2: vec4<f32>;
 
-// The pixels of the windows' middles. Not + 0.5: at 45 degrees rounding would decide.
+// The pixels at the windows' middles. Not + 0.5, so that rounding errors do not decide at 45 degrees.
 fn pixel_of(middle: vec4<f32>) -> vec4<f32> {
     return floor(middle + vec4(0.47));
 }
 
-// Pixels i beside the skeleton's, one of each sample; the windows' middles in their rows; e off their samples.
+// Adds one pixel for each of four samples: at offset i from the skeleton pixel, with the windows' middles in their
+// rows, and at offset e from their samples.
 fn add(i: vec4<f32>, middle: vec4<f32>, e: vec4<f32>, level: vec4<u32>) {
     let t = i - middle;
     let f = max(vec4(1.0) - walk.fade * (t * t), vec4(0.0));
@@ -83,8 +86,8 @@ fn add(i: vec4<f32>, middle: vec4<f32>, e: vec4<f32>, level: vec4<u32>) {
     offsets2 += weight * (e * e);
 }
 
-// Whole pixels by which a group whose middle lies there follows the line. Not + 0.5: at 45 degrees rounding would
-// decide.
+// Whole pixels by which a group with its middle at i is shifted to follow the line. Not + 0.5, so that rounding errors
+// do not decide at 45 degrees.
 fn shift(i: vec4<f32>) -> vec4<f32> {
     return floor(-(i * walk.na) / walk.nb + vec4(0.47));
 }
@@ -94,7 +97,7 @@ fn at_walk(a: f32, b: f32) -> u32 {
     return u32(whole(select(place.y, place.x, walk.columns), select(place.x, place.y, walk.columns)));
 }
 
-// One row of four samples, pixel by pixel along the window.
+// Adds one row of four samples, pixel by pixel along the window.
 fn singles(line: vec4<f32>, row: f32, reach: i32) {
     let middle = line * walk.lean;
     for (var j = -reach; j <= reach; j++) {
@@ -106,20 +109,20 @@ fn singles(line: vec4<f32>, row: f32, reach: i32) {
     }
 }
 
-// Weight of the pixels i beside the skeleton's, in a window that stands still.
+// Weights of the pixels at offsets i from the skeleton pixel, in a window that does not move.
 fn weigh(i: vec4<f32>) -> vec4<u32> {
     let f = max(vec4(1.0) - walk.fade * (i * i), vec4(0.0));
     let g = vec4<u32>(vec4(127.0) * (f * f) + vec4(0.5));
     return select(vec4(0u), g, abs(i) <= vec4(f32(walk.room)));
 }
 
-// First pixel of a group of four beside the skeleton's.
+// Offset of the first pixel of a group of four from the skeleton pixel.
 fn group(g: i32) -> f32 {
     return f32(((walk.a0 + 2 - 2 * frame.fours) & -4) + 4 * g - walk.a0);
 }
 
-// What all samples of a wide stripe by columns have in common: weights, squared weights, weights times offset and its
-// square.
+// Sums that all samples of a wide stripe by columns have in common: weights, squared weights, weights times offset and
+// times its square.
 fn alike(tall: f32) -> vec4<f32> {
     var sums = vec4(0.0);
     for (var row = 0.0; row < tall; row += 1.0) {
@@ -136,7 +139,7 @@ fn alike(tall: f32) -> vec4<f32> {
     return sums;
 }
 
-// Of one row of a sample, pixels of a group of four: their light, and their clipped weights.
+// Light and clipped weights of a group of four pixels, in one row of a sample.
 fn four_of(x: u32, b: f32, g: vec4<u32>) -> vec2<u32> {
     let y = u32(clamp(walk.b0 + i32(b), 0, frame.height - 1));
     let word = first + y * frame.pitch + (x >> px_log2);
@@ -150,7 +153,7 @@ fn four_of(x: u32, b: f32, g: vec4<u32>) -> vec2<u32> {
     return vec2((light.x + light.y) + (light.z + light.w), (clip.x + clip.y) + (clip.z + clip.w));
 }
 
-// One row of four samples of a wide stripe whose window stands still: columns four at a time, as they lie in memory.
+// Adds one row of four samples of a wide stripe whose window does not move: four columns at a time, as they are stored.
 fn fours(line: vec4<f32>) {
     for (var g = 0; g < frame.fours; g++) {
         let i = group(g);
@@ -176,7 +179,7 @@ fn turn_up(q: i32) {
 }
 
 // Whether the pixels at an end of the window's row lie in the picture. Columns that share their shift with three others
-// lie as much as one and a half from where it holds.
+// lie up to one and a half columns from where the shift is exact.
 fn holds(line: vec4<f32>, end: f32, reach: i32, last: vec2<i32>, shared_by: f32) -> vec4<bool> {
     let i = pixel_of(line * walk.lean) + vec4(end * f32(reach));
     let a = vec4(f32(walk.a0)) + i;
@@ -193,22 +196,23 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
     let nb = select(n.x, n.y, columns);
     let lean = select(na * nb, 0.0, abs(na * nb) < STILL);
     let tall = f32(frame.rows);
-    // At whole numbers rounding shall not decide.
+    // The 0.03 below keeps rounding from deciding at whole numbers.
     let held = min(f32(min(b0, last.y - b0)) * abs(nb) / max(abs(na), 1e-6), 8192.0);
     let room = min(min(a0, last.x - a0), i32(floor(held + 0.03)));
     let reach = i32(floor(frame.radius * abs(nb) + min(abs(lean) * frame.half_across * tall, 0.5)));
     walk = Walk(columns, a0, b0, na, nb, lean, room, frame.along_factor / (nb * nb));
-    // A line through what the samples' pixels are off them: sums of weight, weight times k and k^2; times offset and
-    // times k offset.
+    // A line through the average offsets of the samples' pixels: sums of weight, weight times k and k^2; times offset
+    // and times k offset.
     var line_all = vec3(0.0);
     var line_off = vec2(0.0);
-    // Variance, weight and squared weight of the samples near the middle.
+    // Sums of variance, weight and squared weight of the samples near the middle.
     var near_sums = vec3(0.0);
-    // First and last sample whose pixels of weight all lie in the picture.
+    // First and last sample of which all pixels with weight lie in the picture.
     var low = 0.0;
     var high = 0.0;
     let inner = min(reach, room);
-    // Pixel by pixel where the window moves from row to row: columns that share a shift would lie beside it.
+    // If the window moves from row to row, pixels are read one by one: columns that share a shift would lie beside the
+    // window.
     let by_fours = columns && lean == 0.0 && frame.fours > 0;
     let shared_by = select(0.0, 1.5, by_fours);
     var of_all = vec4(0.0);
@@ -231,7 +235,7 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
                 singles(line, row, reach);
             }
         }
-        // The samples go round: four leave at the front, the new ones come in at the end.
+        // The samples rotate through the array: four leave at the front, the new ones enter at the end.
         turn_up(0); turn_up(1); turn_up(2); turn_up(3); turn_up(4); turn_up(5); turn_up(6); turn_up(7); turn_up(8);
         let weight = select(vec4<f32>(weights), vec4(of_all.x), by_fours);
         levels[quads - 1] = vec4<f32>(lit) / weight;
@@ -253,7 +257,7 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
         near_sums += vec3(dot(close, spread), dot(close, weight), dot(close,
             select(vec4<f32>(squares_of), vec4(of_all.y), by_fours)));
     }
-    // From a sample to the next, and at sample 0.
+    // Increase of the offset from a sample to the next, and offset at sample 0.
     let by = (line_all.x * line_off.y - line_all.y * line_off.x) / (line_all.x * line_all.z - line_all.y * line_all.y);
     let offset = (line_off.x - by * line_all.y) / line_all.x;
     let blur2 = max(near_sums.x / line_all.x, 0.0);
@@ -262,7 +266,7 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
         * (127.0 * 127.0)), blur2);
 }
 
-// Levels of sample j and of sample -1 - j, and how much of their weights is clipped.
+// Levels of sample j and of sample -1 - j; below, the clipped shares of their weights.
 fn level_pair(j: i32) -> vec2<f32> {
     let a = u32(2 * quads + j);
     let b = u32(2 * quads - 1 - j);
@@ -275,14 +279,14 @@ fn clipped_pair(j: i32) -> vec2<f32> {
     return vec2(sums[a >> 2u][a & 3u], sums[b >> 2u][b & 3u]);
 }
 
-// By how much samples j and -1 - j lie off their steps.
+// Offsets of samples j and -1 - j from their steps.
 fn stray_pair(j: i32) -> vec2<f32> {
     let a = u32(2 * quads + j);
     let b = u32(2 * quads - 1 - j);
     return vec2(strays[a >> 2u][a & 3u], strays[b >> 2u][b & 3u]) - (vec2(usual.x) + usual.y * pair(j));
 }
 
-// By how much more than usual their pixels scatter about their steps, `stray` off them.
+// By how much the variance of their pixels about their steps exceeds the average, with offsets `stray`.
 fn spread_pair(j: i32, stray: vec2<f32>) -> vec2<f32> {
     let a = u32(2 * quads + j);
     let b = u32(2 * quads - 1 - j);
@@ -294,14 +298,15 @@ fn pair(j: i32) -> vec2<f32> {
     return vec2(f32(j), f32(-1 - j));
 }
 
-// Where the samples begin and end that lie within `reach` of m, in their numbers; not whole.
+// The first and the last number of the samples that lie within `reach` of m; not whole numbers.
 fn span(p: Profile, m: f32, reach: f32) -> vec2<f32> {
     let a = (m - reach - p.offset) / p.step;
     let b = (m + reach - p.offset) / p.step;
     return vec2(max(min(a, b), p.low - 0.5), min(max(a, b), p.high + 0.5));
 }
 
-// How much of a pair's samples lies in a span: in or out would hang on the last bit of its ends.
+// Share of a pair's samples that lies in a span. If a sample were either in or out, the last bit of the span's ends
+// would decide.
 fn share(j: i32, s: vec2<f32>) -> vec2<f32> {
     return clamp(min(pair(j) - vec2(s.x), vec2(s.y) - pair(j)) + vec2(0.5), vec2(0.0), vec2(1.0));
 }

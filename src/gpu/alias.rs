@@ -1,33 +1,33 @@
-//! In: a software adapter under Vulkan. Out: memory that its stages write as a buffer and read as texels, and that the
-//! host writes where it lies. Frame and unit: bytes.
+//! In: a software adapter under Vulkan. Out: memory that stages write as a buffer and read as texels, and that the host
+//! accesses in place. Frame and unit: bytes.
 //!
-//! Buffer and images are bound to the same bytes (VK_IMAGE_CREATE_ALIAS_BIT, linear tiling). wgpu does not know
-//! that they share them and so puts no barrier between a write of the one and a read of the other; none is needed where
-//! dispatches run one after the other, as on a software adapter, and only there is this offered, after a trial
-//! ([`super::texels_trial::trial`]). Reasons and figures: docs/decisions/0012.
+//! Buffer and images are bound to the same bytes (VK_IMAGE_CREATE_ALIAS_BIT, linear tiling). wgpu does not know that
+//! they share memory. It therefore puts no barrier between a write of the buffer and a read of the image. None is
+//! needed if dispatches run one after the other, as on a software adapter. This module is used only there, after a
+//! trial ([`super::texels_trial::trial`]). Reasons and figures: docs/decisions/0012.
 
 use super::texels::{ROW_LOG2, Texel};
 use ash::vk;
 use std::sync::{Arc, OnceLock};
 use wgpu::hal::api::Vulkan;
 
-/// Bytes that a buffer and images lie on; freed after the last of them.
+/// Memory that a buffer and its images share; freed after the last of them.
 struct Memory {
     device: ash::Device,
     raw: vk::DeviceMemory,
     host: *mut u8,
     bytes: u64,
-    /// Its place in the adapter's list of memory types.
+    /// Index in the adapter's list of memory types.
     kind: u32,
-    /// Vulkan's device, and the driver that holds its code, must outlive the memory: scans with an ambient picture
-    /// crashed at their end without it (tests/scan/inputs.rs).
+    /// The device and the driver that holds its code must outlive the memory. Without this field, scans with an ambient
+    /// picture crashed when they ended (tests/scan/inputs.rs).
     _owner: wgpu::Device,
 }
 
-// SAFETY: the host's pointer is used under the rules of `Aliased::read` and `Aliased::write` only; Vulkan's handles
-// may be used by any thread.
+// SAFETY: the host's pointer is used only under the rules of `Aliased::read` and `Aliased::write`. Vulkan's handles may
+// be used by any thread.
 unsafe impl Send for Memory {}
-// SAFETY: as above; nothing of it changes after it was made.
+// SAFETY: as above; no field changes after construction.
 unsafe impl Sync for Memory {}
 
 impl Drop for Memory {
@@ -37,7 +37,7 @@ impl Drop for Memory {
     }
 }
 
-/// What else lies on a buffer's memory.
+/// The memory of a buffer, and the images that share it, one for each [`Texel`].
 pub(super) struct Aliased {
     memory: Arc<Memory>,
     views: [OnceLock<wgpu::TextureView>; 2],
@@ -49,19 +49,19 @@ impl std::fmt::Debug for Aliased {
     }
 }
 
-/// A buffer on memory of its own; `None` where the adapter is not Vulkan's or the memory cannot be had.
+/// A buffer with its own memory. `None` if the adapter is not Vulkan's or the memory cannot be allocated.
 ///
 /// # Safety
-/// The buffer's usages are among those of a storage buffer that nobody maps, and the adapter shares its memory with
+/// The buffer's usages are among those of a storage buffer that is never mapped, and the adapter shares its memory with
 /// the host.
 pub(super) unsafe fn buffer(
     device: &wgpu::Device,
     descriptor: &wgpu::BufferDescriptor,
     zeroed: bool,
 ) -> Option<(wgpu::Buffer, Arc<Aliased>)> {
-    // SAFETY: nothing of the device is destroyed through this handle; what is made here is destroyed where a later step
-    // fails, else by `destroy`, which wgpu calls when no work uses the buffer any more. The memory is bound once, to
-    // a type that the buffer's requirements allow, and mapped as a whole while it lives.
+    // SAFETY: nothing of the device is destroyed through this handle. What is made here is destroyed if a later step
+    // fails, or else by `destroy`, which wgpu calls when no work uses the buffer any more. The memory is bound once, to
+    // a type that the buffer's requirements allow, and is mapped as a whole while it lives.
     unsafe {
         let hal = device.as_hal::<Vulkan>()?;
         let (raw, instance) = (hal.raw_device().clone(), hal.shared_instance().raw_instance());
@@ -73,7 +73,7 @@ pub(super) unsafe fn buffer(
         let buffer =
             raw.create_buffer(&vk::BufferCreateInfo::default().size(descriptor.size).usage(usage), None).ok()?;
         let needs = raw.get_buffer_memory_requirements(buffer);
-        // Room for whole groups of four rows of the largest texels, which is what images are padded to.
+        // Images are padded to whole groups of four rows of the largest texels.
         let bytes = needs.size.next_multiple_of((4 * Texel::Four.bytes()) << ROW_LOG2);
         let kinds = instance.get_physical_device_memory_properties(hal.raw_physical_device());
         let wanted = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
@@ -113,16 +113,16 @@ pub(super) unsafe fn buffer(
 }
 
 impl Aliased {
-    /// The same bytes as an image of at most `most` rows, of 2^ROW_LOG2 texels each, one after the other; `None`
-    /// where the adapter has no such image, or would lay it out in another way.
+    /// The same bytes as an image of at most `most` rows of 2^ROW_LOG2 texels, stored one after the other. `None` if
+    /// the adapter has no such image, or would lay it out differently.
     ///
     /// # Safety
-    /// `device` is the one that the buffer was made on; nobody submits to its queue meanwhile; its dispatches run one
-    /// after the other, so that no barrier is needed between a write of the buffer and a read of the image.
+    /// `device` is the one that the buffer was made on. Nobody submits to its queue during the call. Its dispatches run
+    /// one after the other, so that no barrier is needed between a write of the buffer and a read of the image.
     pub(super) unsafe fn texels(&self, device: &wgpu::Device, texel: Texel, most: u32) -> Option<&wgpu::TextureView> {
         let slot = &self.views[texel as usize];
         if slot.get().is_none() {
-            // SAFETY: the caller's promises are those that are asked for here.
+            // SAFETY: the caller's promises are the ones that `image` requires.
             let _ = slot.set(unsafe { self.image(device, texel, most) }?);
         }
         slot.get()
@@ -140,9 +140,9 @@ impl Aliased {
             Texel::One => vk::Format::R32_UINT,
             Texel::Four => vk::Format::R32G32B32A32_UINT,
         };
-        // SAFETY: as in `buffer`; the adapter has such images, the memory's type is one that this image may lie on,
-        // the image lies within the memory, which it holds until it is destroyed, and it is in the layout that wgpu
-        // is told of.
+        // SAFETY: as in `buffer`. The adapter has such images, and the memory's type is one that this image may be
+        // bound to. The image fits in the memory, which it holds until it is destroyed. Its layout is the one that wgpu
+        // is given.
         unsafe {
             let hal = device.as_hal::<Vulkan>()?;
             let (raw, instance) = (hal.raw_device().clone(), hal.shared_instance().raw_instance());
@@ -164,7 +164,7 @@ impl Aliased {
                 .samples(vk::SampleCountFlags::TYPE_1)
                 .tiling(tiling)
                 .usage(usage)
-                // The bytes that lie there stay: from "undefined" they would be lost.
+                // The bytes must stay: the layout "undefined" would lose them.
                 .initial_layout(vk::ImageLayout::PREINITIALIZED);
             let image = raw.create_image(&info, None).ok()?;
             let part = vk::ImageSubresource { aspect_mask: vk::ImageAspectFlags::COLOR, mip_level: 0, array_layer: 0 };
@@ -212,33 +212,32 @@ impl Aliased {
         }
     }
 
-    /// Reads where the bytes lie.
+    /// Reads the bytes in place.
     ///
     /// # Safety
-    /// As long as the bytes are borrowed no submitted work writes the buffer, and nobody calls [`Aliased::write`]
-    /// there.
+    /// While the bytes are borrowed, no submitted work writes the buffer, and nobody calls [`Aliased::write`] on it.
     pub(super) unsafe fn read(&self, range: std::ops::Range<usize>) -> &[u8] {
         assert!(range.start <= range.end && range.end as u64 <= self.memory.bytes, "{range:?} bytes");
-        // SAFETY: inside the mapped memory, just checked, which stays mapped as long as `self` lives.
+        // SAFETY: inside the mapped memory, as just checked, which stays mapped as long as `self` lives.
         unsafe { std::slice::from_raw_parts(self.memory.host.add(range.start), range.len()) }
     }
 
-    /// Writes where the bytes lie.
+    /// Writes the bytes in place.
     ///
     /// # Safety
     /// No submitted work uses the buffer, nobody borrows these bytes, and no other thread writes them.
     pub(super) unsafe fn write(&self, offset: usize, bytes: &[u8]) {
         let end = offset.checked_add(bytes.len()).filter(|end| *end as u64 <= self.memory.bytes);
         assert!(end.is_some(), "{offset} + {} bytes", bytes.len());
-        // SAFETY: inside the mapped memory, just checked; it stays mapped as long as `self` lives.
+        // SAFETY: inside the mapped memory, as just checked, which stays mapped as long as `self` lives.
         unsafe { self.memory.host.add(offset).copy_from_nonoverlapping(bytes.as_ptr(), bytes.len()) };
     }
 }
 
-/// Takes a new image to the layout in which stages read it, and waits for that; its bytes stay.
+/// Changes a new image to the layout in which stages read it, and waits for that. The bytes are preserved.
 ///
 /// # Safety
-/// Nobody submits to the device's queue meanwhile; the image is bound, and in the layout that it was made in.
+/// Nobody submits to the device's queue during the call. The image is bound, and in the layout that it was made in.
 unsafe fn to_general(hal: &wgpu::hal::vulkan::Device, image: vk::Image) -> Result<(), vk::Result> {
     let raw = hal.raw_device();
     let whole =
@@ -254,7 +253,7 @@ unsafe fn to_general(hal: &wgpu::hal::vulkan::Device, image: vk::Image) -> Resul
         .subresource_range(whole);
     let (before, after) =
         (vk::PipelineStageFlags::HOST | vk::PipelineStageFlags::COMPUTE_SHADER, vk::PipelineStageFlags::COMPUTE_SHADER);
-    // SAFETY: the commands are recorded, run once and waited for before their pool and the fence go.
+    // SAFETY: the commands are recorded, run once and waited for before their pool and the fence are destroyed.
     unsafe {
         let pool = vk::CommandPoolCreateInfo::default().queue_family_index(hal.queue_family_index());
         let pool = raw.create_command_pool(&pool, None)?;
@@ -291,7 +290,7 @@ mod tests {
         let memory = buffer.aliased.as_ref().unwrap();
         let outside = |act: &dyn Fn()| catch_unwind(AssertUnwindSafe(act)).is_err();
         let held = memory.memory.bytes as usize;
-        // SAFETY: nothing is submitted, and nobody else has the buffer; what is outside is what is tried.
+        // SAFETY: nothing is submitted, and nobody else has the buffer. Accesses out of bounds are what the test tries.
         unsafe {
             assert!(outside(&|| memory.write(usize::MAX, &[1, 2])) && outside(&|| memory.write(held - 1, &[1, 2])));
             assert!(outside(&|| _ = memory.read(held..held + 1)) && outside(&|| _ = memory.read(0..usize::MAX)));

@@ -1,10 +1,10 @@
-//! In: work for a device that nobody waits for yet. Out: it is done on other threads, and none is under way when the
-//! device is gone: the process must not end, and take the driver down, while its compiler runs. Frame and unit: none.
+//! In: work for a device that nobody waits for yet. Out: the work, done on other threads. None is running when the
+//! device is gone: the process must not end, and unload the driver, while its compiler runs. Frame and unit: none.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, PoisonError, RwLock};
 
-/// Whether work may begin; who works holds the lock for reading.
+/// Whether work may begin. A thread that works holds the lock for reading.
 pub(super) struct Background(Arc<RwLock<bool>>);
 
 impl Default for Background {
@@ -14,8 +14,8 @@ impl Default for Background {
 }
 
 impl Background {
-    /// Does work as soon as a thread is free, or never where the device is dropped before. What panics there has to
-    /// panic again where its result is used.
+    /// Does work as soon as a thread is free, or never if the device is dropped first. A panic is caught here: the user
+    /// of the result must panic again.
     pub(super) fn begin(&self, work: impl FnOnce() + Send + 'static) {
         let allowed = self.0.clone();
         rayon::spawn_fifo(move || {

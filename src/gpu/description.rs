@@ -1,5 +1,5 @@
-//! In: nothing. Out: a stage as it is written down: its text, what it binds, the fields of its uniform block.
-//! Frame and unit: bytes.
+//! In: nothing. Out: the description of a stage: its text, its bindings, the fields of its uniform block. Frame and
+//! unit: bytes.
 
 /// How a stage uses a binding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -8,13 +8,14 @@ pub enum Access {
     Uniform,
     /// A read-only storage buffer.
     Read,
-    /// A read-only array of `u32`, `vec2<u32>` or `vec4<u32>` that is bound whole: read as texels where that is faster.
+    /// A read-only array of `u32`, `vec2<u32>` or `vec4<u32>` that is bound whole; it is read as texels on adapters
+    /// where that is faster.
     Texels,
     /// A storage buffer that the stage may write.
     ReadWrite,
 }
 
-/// One binding of group 0; its place in `Stage::bindings` is its number.
+/// One binding of group 0; its index in `Stage::bindings` is its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Binding {
     /// The WGSL variable's name.
@@ -32,11 +33,11 @@ pub struct Field {
     pub offset: usize,
 }
 
-/// One shader with one entry point `main`. The shared texts are appended after the stage's own, so
-/// that line numbers in messages are those of its file.
+/// One shader with one entry point `main`. The shared texts are appended after the stage's own text, so that line
+/// numbers in messages are those of its file.
 #[derive(Clone, Copy, Debug)]
 pub struct Stage {
-    /// The file is shaders/NAME.wgsl.
+    /// The stage's file is shaders/NAME.wgsl.
     pub name: &'static str,
     /// WGSL text of that file.
     pub wgsl: &'static str,
@@ -44,7 +45,7 @@ pub struct Stage {
     pub shared: &'static [&'static str],
     /// Invocations in one workgroup: x, y, z.
     pub workgroup: [u32; 3],
-    /// All of group 0, in the order of their numbers.
+    /// All bindings of group 0, in the order of their numbers.
     pub bindings: &'static [Binding],
     /// The uniform struct's WGSL name, members and size in bytes; every `Access::Uniform` binding has this type.
     pub uniform: (&'static str, &'static [Field], usize),

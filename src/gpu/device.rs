@@ -1,5 +1,5 @@
-//! In: the adapters of this machine. Out: one opened device, its buffers, its measured transfer rates.
-//! Frame and unit: bytes, GB/s (1e9 bytes).
+//! In: the adapters of this machine. Out: one opened device and its buffers.
+//! Frame and unit: bytes.
 
 use super::alias::{self, Aliased};
 use super::background::Background;
@@ -13,16 +13,16 @@ use std::time::Duration;
 /// The longest a single submission may take before the device counts as lost.
 const TIMEOUT: Duration = Duration::from_secs(60);
 
-/// What a person wants to know about an adapter.
+/// Properties of an adapter for people to read.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct AdapterInfo {
-    /// As the driver gives it; SHEETLIGHT_ADAPTER is looked for in it.
+    /// As the driver gives it. SHEETLIGHT_ADAPTER is searched in it.
     pub name: String,
-    /// discrete GPU, integrated GPU, virtual GPU, CPU, other.
+    /// One of: discrete GPU, integrated GPU, virtual GPU, CPU, other.
     pub kind: String,
-    /// The interface it is reached by: vulkan, metal or dx12.
+    /// The graphics interface: vulkan, metal or dx12.
     pub backend: String,
-    /// Name and version of the driver, as far as it says them.
+    /// Name and version of the driver, as far as it states them.
     pub driver: String,
     /// Largest buffer a stage can bind, bytes.
     pub max_binding_bytes: u64,
@@ -30,19 +30,19 @@ pub struct AdapterInfo {
     pub max_workgroup: u32,
     /// Most storage buffers that one stage can bind.
     pub storage_buffers_per_stage: u32,
-    /// GPU timestamps can be taken.
+    /// Whether GPU timestamps can be taken.
     pub timestamps: bool,
-    /// Host and device share memory that stages can read where the host writes it.
+    /// Whether host and device share memory, so that stages can read in place what the host writes.
     pub unified_memory: bool,
 }
 
-/// A storage buffer on the device. `bytes` is what was asked for.
+/// A storage buffer on the device. `bytes` is the requested size.
 #[derive(Clone, Debug)]
 pub struct Buffer {
     pub(super) raw: wgpu::Buffer,
-    /// Bytes; on the device they are filled up to a multiple of 16.
+    /// Bytes; on the device they are padded to a multiple of 16.
     pub bytes: u64,
-    /// Where it lies, if it can be read as texels.
+    /// The memory under the buffer, if it can be read as texels.
     pub(super) aliased: Option<Arc<Aliased>>,
 }
 
@@ -51,19 +51,19 @@ pub struct Buffer {
 pub struct Device {
     pub(super) raw: wgpu::Device,
     pub(super) queue: wgpu::Queue,
-    /// The adapter it was opened on.
+    /// The adapter on which it was opened.
     pub info: AdapterInfo,
     /// Stages read arrays as texels of images on the same memory: faster on a software adapter (decision 0012).
     pub reads_texels: bool,
-    /// Nanoseconds per timestamp tick, where the adapter has timestamps.
+    /// Nanoseconds per timestamp tick; `None` if the adapter has no timestamps.
     pub(super) tick_ns: Option<f32>,
     lost: Arc<Mutex<Option<String>>>,
     /// Bytes of all buffers made through this device.
     allocated: Arc<std::sync::atomic::AtomicU64>,
     pub(super) background: Arc<Background>,
-    /// One at a time: Vulkan asks for it where a queue is used beside wgpu.
+    /// One submission at a time: Vulkan requires it if a queue is used beside wgpu.
     submitting: Arc<Mutex<()>>,
-    /// Most rows of an image that an array is read as.
+    /// Most rows of an image as which an array is read.
     pub(super) image_rows: u32,
 }
 
@@ -100,14 +100,14 @@ fn describe(adapter: &wgpu::Adapter) -> AdapterInfo {
 
 const TIMESTAMPS: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
 
-/// A discrete GPU may offer mappable storage as well, but over the bus: a copy to its own memory is
-/// better there.
+/// A discrete GPU may offer mappable storage as well, but the stages would access it over the bus. A copy to its own
+/// memory is faster there.
 fn unified(kind: &wgpu::DeviceType, features: wgpu::Features) -> bool {
     matches!(kind, wgpu::DeviceType::Cpu | wgpu::DeviceType::IntegratedGpu)
         && features.contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS)
 }
 
-/// Adapters of this machine, best first: discrete, integrated, virtual, software.
+/// Adapters of this machine, best first: discrete, integrated, virtual, other, software.
 pub fn adapters() -> Vec<AdapterInfo> {
     sorted(&instance()).iter().map(describe).collect()
 }
@@ -124,7 +124,7 @@ fn sorted(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
     all
 }
 
-/// The best adapter whose name holds `wanted`.
+/// The best adapter whose name contains `wanted`.
 fn chosen(wanted: Option<&str>) -> Result<wgpu::Adapter> {
     let all = sorted(&instance());
     let names: Vec<String> = all.iter().map(|a| a.get_info().name).collect();
@@ -144,14 +144,14 @@ fn chosen(wanted: Option<&str>) -> Result<wgpu::Adapter> {
         })
 }
 
-/// Where a lost device leaves the reason.
+/// Receives the reason when the device is lost.
 fn heard(raw: &wgpu::Device) -> Arc<Mutex<Option<String>>> {
     let lost = Arc::new(Mutex::new(None::<String>));
     let note = lost.clone();
     raw.set_device_lost_callback(move |reason, message| {
         note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(format!("{reason:?}: {message}"));
     });
-    // Out of memory and driver errors surface here; a validation error is our bug and panics.
+    // Out of memory and driver errors arrive here; a validation error is a bug in this program and panics.
     let note = lost.clone();
     raw.on_uncaptured_error(Arc::new(move |e: wgpu::Error| match e {
         wgpu::Error::Validation { .. } if note.lock().unwrap_or_else(PoisonError::into_inner).is_none() => {
@@ -165,12 +165,12 @@ fn heard(raw: &wgpu::Device) -> Arc<Mutex<Option<String>>> {
 }
 
 impl Device {
-    /// Opens the best adapter whose name holds `wanted`; it reads arrays as every other adapter does.
+    /// Opens the best adapter whose name contains `wanted`. The device reads arrays as buffers, not as texels.
     pub(super) fn opened(wanted: Option<&str>) -> Result<Device> {
         let chosen = chosen(wanted)?;
         let info = describe(&chosen);
         let offered = chosen.limits();
-        // Only what the stages use is raised above the portable defaults, to what the adapter has.
+        // Only the limits that the stages need are raised above the portable defaults, up to what the adapter offers.
         let limits = wgpu::Limits {
             max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
             max_buffer_size: offered.max_buffer_size,
@@ -215,18 +215,18 @@ impl Device {
         })
     }
 
-    /// The same device with its arrays read as every other adapter reads them; for tests and comparisons.
+    /// The same device with its arrays read as buffers, as on every other adapter; for tests and comparisons.
     pub fn without_texels(&self) -> Device {
         Device { reads_texels: false, ..self.clone() }
     }
 
-    /// The same device, used as one with memory and processors of its own: for tests where there is no such device.
+    /// The same device, treated as one with its own memory and processors: for tests on machines without such a device.
     pub fn as_discrete(&self) -> Device {
         let info = AdapterInfo { kind: "discrete GPU".into(), unified_memory: false, ..self.info.clone() };
         Device { info, reads_texels: false, ..self.clone() }
     }
 
-    /// False for a software adapter, which takes the cores that the CPU twins would use.
+    /// False for a software adapter, which runs on the cores that the CPU twins would use.
     pub fn has_own_processors(&self) -> bool {
         self.info.kind != "CPU"
     }
@@ -236,24 +236,24 @@ impl Device {
         use wgpu::BufferUsages as U;
         self.buffer(label, bytes, U::STORAGE | U::INDIRECT | U::UNIFORM | U::COPY_SRC | U::COPY_DST, true)
     }
-    /// Where stages read what the host writes, on unified memory.
+    /// A buffer that the host writes and stages read in place, on unified memory.
     pub fn mapped_storage(&self, label: &str, bytes: u64) -> Result<Buffer> {
         use wgpu::BufferUsages as U;
         let access = if self.reads_texels { U::COPY_DST } else { U::MAP_WRITE };
         self.buffer(label, bytes, U::STORAGE | access | U::COPY_SRC, true)
     }
-    /// Where the host reads what stages wrote, on unified memory. What they did not write is undefined: such a buffer
-    /// is sized for the worst case, and memory that is never touched costs nothing.
+    /// A buffer that stages write and the host reads in place, on unified memory. Bytes that the stages did not write
+    /// are undefined: such a buffer is sized for the worst case, and memory that is never touched costs nothing.
     pub fn readable_storage(&self, label: &str, bytes: u64) -> Result<Buffer> {
         use wgpu::BufferUsages as U;
         let access = if self.reads_texels { U::COPY_DST } else { U::MAP_READ };
         self.buffer(label, bytes, U::STORAGE | access | U::COPY_SRC, false)
     }
-    /// Written by the host, copied to a storage buffer.
+    /// A buffer that the host writes and that is copied to a storage buffer.
     pub fn upload_staging(&self, label: &str, bytes: u64) -> Result<Buffer> {
         self.buffer(label, bytes, wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC, true)
     }
-    /// Copied to from a storage buffer, read by the host.
+    /// A buffer that a storage buffer is copied to and that the host reads.
     pub fn readback_staging(&self, label: &str, bytes: u64) -> Result<Buffer> {
         self.buffer(label, bytes, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST, true)
     }
@@ -289,11 +289,11 @@ impl Device {
         Ok(Buffer { raw, bytes, aliased: None })
     }
 
-    /// A buffer as an image; `None` where it is too large for one, or the adapter has none of that kind.
+    /// A buffer as an image. `None` if it is too large for one, or the adapter has no image of that kind.
     pub(super) fn texels<'a>(&self, buffer: &'a Buffer, texel: Texel) -> Option<&'a wgpu::TextureView> {
         let _alone = self.submitting.lock().unwrap_or_else(PoisonError::into_inner);
         // SAFETY: only buffers of this device are aliased, and only on a software adapter, which runs dispatches one
-        // after the other; all submissions take the lock.
+        // after the other. All submissions take the lock.
         unsafe { buffer.aliased.as_ref()?.texels(&self.raw, texel, self.image_rows) }
     }
 
@@ -308,7 +308,7 @@ impl Device {
         self.allocated.load(std::sync::atomic::Ordering::Relaxed)
     }
 
-    /// Queues a write; it lands before the next submission.
+    /// Queues a write, which is executed before the next submission.
     pub fn write(&self, buffer: &Buffer, offset: u64, bytes: &[u8]) {
         if bytes.len().is_multiple_of(4) {
             self.queue.write_buffer(&buffer.raw, offset, bytes);
@@ -319,7 +319,7 @@ impl Device {
         }
     }
 
-    /// Copies a storage buffer to the host; waits. For tests and self-tests, not for the shot path.
+    /// Copies a storage buffer to the host; waits. For tests and self-tests, not for scanning.
     pub fn read(&self, buffer: &Buffer) -> Result<Vec<u8>> {
         let staging = self.readback_staging("read", buffer.bytes)?;
         let mut encoder = self.raw.create_command_encoder(&Default::default());
@@ -347,7 +347,7 @@ impl Device {
         self.alive()
     }
 
-    /// `Err` once the device was lost or ran out of memory.
+    /// `Err` after the device was lost or ran out of memory.
     pub fn alive(&self) -> Result<()> {
         match &*self.lost.lock().unwrap_or_else(PoisonError::into_inner) {
             None => Ok(()),
@@ -357,7 +357,7 @@ impl Device {
         }
     }
 
-    /// Ends the device on purpose, as a driver crash would; what follows must end in a clear error.
+    /// Destroys the device on purpose, as a driver crash would. Later calls must fail with a clear error.
     pub fn lose(&self) {
         self.raw.destroy();
         let _ = self.raw.poll(wgpu::PollType::Poll);
@@ -365,11 +365,11 @@ impl Device {
     }
 }
 
-/// A part of an open buffer.
+/// A part of a mapped buffer.
 struct Place<'a>(wgpu::WriteOnly<'a, [u8]>);
 
-// SAFETY: it is the only way to its bytes, as `&mut [u8]` would be, which may go to another thread. wgpu says so of all
-// elements of a known size; of slices it says nothing.
+// SAFETY: it is the only access to its bytes, like a `&mut [u8]`, which may go to another thread. wgpu declares this
+// for elements of a known size, but not for slices.
 unsafe impl Send for Place<'_> {}
 
 impl Place<'_> {
@@ -378,10 +378,10 @@ impl Place<'_> {
     }
 }
 
-/// What writes the part of a buffer with this number.
+/// Writes the part of a buffer with the given number.
 pub(super) type Fill<'a> = dyn Fn(usize, &mut dyn FnMut(usize, &[u8])) -> Result<()> + Sync + 'a;
 
-/// A mapping that was asked for; `done` after the device was polled.
+/// A mapping that was requested; `done` may be called after the device was polled.
 pub(super) struct Mapping(Arc<Mutex<Option<std::result::Result<(), wgpu::BufferAsyncError>>>>);
 
 impl Mapping {
@@ -399,20 +399,21 @@ impl Mapping {
 }
 
 impl Buffer {
-    /// Asks for what the host must have before it fills the buffer: nothing where the memory lies open.
+    /// Requests the mapping that the host needs before it fills the buffer. `None` if the host can access the memory
+    /// directly.
     pub(super) fn open(&self) -> Option<Mapping> {
         self.aliased.is_none().then(|| self.map(wgpu::MapMode::Write, 0..self.bytes))
     }
-    /// The host's writes to an open buffer, which is divided into parts of so many bytes: `fill` is given a part's
-    /// number and its writer (byte offset in the part, bytes), by several threads where there are `writers`. Closes
-    /// it, failed or not.
+    /// Writes to an open buffer, which is divided into parts of the given sizes in bytes. `fill` receives a part's
+    /// number and its writer (byte offset in the part, bytes). Several threads call it if there are `writers`. Closes
+    /// the buffer, also after an error.
     pub(super) fn fill(&self, parts: &[usize], writers: Option<&ThreadPool>, fill: &Fill) -> Result<()> {
         if let Some(host) = &self.aliased {
             let mut begin = 0;
             return parts.iter().enumerate().try_for_each(|(i, bytes)| {
                 let first = begin;
                 begin += bytes;
-                // SAFETY: the ring hands out a place whose batch is done, to this thread alone.
+                // SAFETY: the ring gives out a slot only after its batch is done, and only to this thread.
                 fill(i, &mut |offset, bytes| unsafe { host.write(first + offset, bytes) })
             });
         }

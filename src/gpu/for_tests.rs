@@ -1,16 +1,17 @@
-//! How unit tests get an adapter: skipped aloud without one, a failure where a GPU is required.
+//! How unit tests get an adapter: without one they are skipped with a message, or fail if a GPU is required.
 
 use super::Device;
 use crate::fault::{Fault, Result};
 
-/// How unit tests get an adapter. Without one they are skipped aloud, and fail if SHEETLIGHT_REQUIRE_GPU is set.
+/// How unit tests get an adapter. Without one they are skipped with a message, and fail if SHEETLIGHT_REQUIRE_GPU is
+/// set.
 impl Device {
     /// Any adapter.
     pub(crate) fn for_tests() -> Option<Device> {
         found(Device::open(), required())
     }
 
-    /// A software adapter whose buffers can be read as texels. Other adapters have no use for texels.
+    /// A software adapter whose buffers can be read as texels. Other adapters do not use texels.
     pub(crate) fn with_texels_for_tests() -> Option<Device> {
         let device = Device::for_tests()?;
         if device.has_own_processors() || !device.info.unified_memory {

@@ -1,5 +1,5 @@
-//! In: WGSL stages, bytes, and what depends on what. Out: the same bytes computed on a GPU, with timings.
-//! Frame and unit: none; knows no lasers. The only home of `wgpu`.
+//! In: WGSL stages, bytes, and the order of the stages. Out: the bytes that the stages compute on a GPU, with timings.
+//! Frame and unit: none. This module knows nothing of lasers, and is the only home of `wgpu`.
 
 #[cfg_attr(not(target_os = "linux"), path = "no_alias.rs")]
 mod alias;

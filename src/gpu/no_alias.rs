@@ -1,4 +1,4 @@
-//! In: any device. Out: nothing: here no memory is both a buffer and an image. Frame and unit: bytes.
+//! In: any device. Out: nothing: on this system no memory is both a buffer and an image. Frame and unit: bytes.
 
 use super::texels::Texel;
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use std::sync::Arc;
 pub(super) enum Aliased {}
 
 /// # Safety
-/// None is asked for.
+/// There are no requirements.
 pub(super) unsafe fn buffer(
     _: &wgpu::Device,
     _: &wgpu::BufferDescriptor,
@@ -18,7 +18,7 @@ pub(super) unsafe fn buffer(
 
 impl Aliased {
     /// # Safety
-    /// None is asked for, here and below.
+    /// There are no requirements, here and below.
     pub(super) unsafe fn texels(&self, _: &wgpu::Device, _: Texel, _: u32) -> Option<&wgpu::TextureView> {
         match *self {}
     }

@@ -1,5 +1,5 @@
-//! In: a device. Out: how fast this machine moves pictures there, on the path that the chain takes, and results back.
-//! Frame and unit: bytes, 1e9 bytes a second.
+//! In: a device. Out: the rates at which this machine moves pictures to it, on the path that the chain takes, and
+//! results back. Frame and unit: bytes, 1e9 bytes a second.
 
 use super::description::{Access, Binding, Stage};
 use super::ring::{PART, Ring, RingSizes};
@@ -10,22 +10,22 @@ use std::time::Instant;
 /// Transfer rates between host and device, 1e9 bytes a second.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rates {
-    /// Pictures in the host's memory, one after the other through the ring, without any stage.
+    /// Upload of pictures from the host's memory, one after the other through the ring, without any stage.
     pub upload_gb_s: f64,
-    /// Into a slice, one by one.
+    /// Readback into a slice, one copy at a time.
     pub readback_gb_s: f64,
-    /// Bytes read and written by copies within the device's memory, where it has its own.
+    /// Bytes read and written by copies within the device's memory. `None` if it has no memory of its own.
     pub device_gb_s: Option<f64>,
 }
 
-/// Batches under way, and those that are timed.
+/// Batches in flight, and number of batches that are timed.
 const SLOTS: usize = 3;
 const ROUNDS: usize = 32;
-/// Bytes of a copy within the device, more than its caches hold, where it binds as many; and copies that are timed
-/// together.
+/// Bytes of a copy within the device, more than its caches hold, if a binding may be that large; and number of copies
+/// that are timed together.
 const COPY: u64 = 1 << 28;
 const COPIES: usize = 32;
-/// A stage copies faster than the command for it.
+/// Copies within the device. A stage copies faster than the copy command.
 const COPIER: Stage = Stage {
     name: "copy",
     wgsl: "@group(0) @binding(0) var<storage, read> before: array<vec4<u32>>;
@@ -45,7 +45,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
 };
 
 impl Device {
-    /// Rates for pictures of so many bytes; medians.
+    /// Median rates for pictures of `bytes` bytes.
     pub fn measure_rates(&self, bytes: u64) -> Result<Rates> {
         let rate = |bytes: u64, mut seconds: Vec<f64>| {
             seconds.sort_by(f64::total_cmp);
@@ -90,7 +90,7 @@ impl Device {
         Ok(seconds)
     }
 
-    /// Seconds of `COPIES` copies within the device.
+    /// Seconds that `COPIES` copies within the device take.
     fn copies(&self, bytes: u64) -> Result<Vec<f64>> {
         let (a, b) = (self.storage("rate", bytes)?, self.storage("rate copy", bytes)?);
         let copier = COPIER.pipeline(self, &[])?;

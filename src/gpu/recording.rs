@@ -1,5 +1,5 @@
-//! In: dispatches with their buffers, as data. Out: the same work replayed shot after shot, timed on request.
-//! Frame and unit: none; times in seconds.
+//! In: dispatches with their buffers, as data. Out: the same work, replayed for each batch and timed on request. Frame
+//! and unit: none; times in seconds.
 
 use super::stage::Compiled;
 use super::{Buffer, Device, Pipeline};
@@ -19,12 +19,12 @@ pub struct Dispatch {
 #[derive(Clone, Debug)]
 enum Size {
     Groups([u32; 3]),
-    /// Three u32 at a byte offset of a buffer.
+    /// Number of workgroups: three u32 at a byte offset of a buffer.
     Indirect(wgpu::Buffer, u64),
 }
 
-/// GPU work, built once per configuration and replayed per batch of shots. All of it runs in one
-/// compute pass: a pass costs more than several dispatches.
+/// GPU work, built once per configuration and replayed per batch of shots. It runs in one compute pass, because a pass
+/// costs more than several dispatches.
 #[derive(Clone, Debug, Default)]
 pub struct Recording {
     steps: Vec<Dispatch>,
@@ -40,12 +40,12 @@ pub struct StageTime {
 }
 
 impl Recording {
-    /// Whole buffers, in the order of the stage's bindings.
+    /// Adds a dispatch that binds whole buffers, in the order of the stage's bindings.
     pub fn dispatch(&mut self, device: &Device, pipeline: &Pipeline, buffers: &[&Buffer], groups: [u32; 3]) {
         let parts: Vec<_> = buffers.iter().map(|b| (*b, 0, b.raw.size())).collect();
         self.dispatch_parts(device, pipeline, &parts, groups);
     }
-    /// Parts of buffers: (buffer, byte offset, bytes); offsets are multiples of 256.
+    /// Adds a dispatch that binds parts of buffers: (buffer, byte offset, bytes). Offsets are multiples of 256.
     pub fn dispatch_parts(
         &mut self,
         device: &Device,
@@ -55,7 +55,7 @@ impl Recording {
     ) {
         self.push(device, pipeline, parts, Size::Groups(groups));
     }
-    /// The number of workgroups is read from `args` when the step runs.
+    /// Adds a dispatch whose number of workgroups is read from `args` (buffer, byte offset) when the step runs.
     pub fn indirect(
         &mut self,
         device: &Device,
@@ -69,7 +69,7 @@ impl Recording {
         let (pipeline, label) = (pipeline.bind(device, parts), pipeline.stage.name);
         self.steps.push(Dispatch { label, pipeline: pipeline.0, bind: pipeline.1, size });
     }
-    /// Adds the steps of another recording behind its own.
+    /// Appends the steps of another recording.
     pub fn append(&mut self, other: &Recording) {
         self.steps.extend(other.steps.iter().cloned());
     }
@@ -77,13 +77,13 @@ impl Recording {
     pub fn len(&self) -> usize {
         self.steps.len()
     }
-    /// There is nothing to run.
+    /// Whether there are no steps.
     pub fn is_empty(&self) -> bool {
         self.steps.is_empty()
     }
 }
 
-/// Submits recordings: uploads before, copies to the host after.
+/// Submits recordings, with uploads before them and copies to the host after them.
 pub struct Replay {
     device: Device,
     queries: Option<(wgpu::QuerySet, Buffer, Buffer)>,
@@ -94,7 +94,7 @@ pub struct Replay {
 const QUERIES: u32 = 512;
 
 impl Replay {
-    /// `timed` takes a timestamp before every step where the adapter can; it costs a few microseconds a step.
+    /// `timed` takes a timestamp before every step if the adapter has timestamps; that costs a few microseconds a step.
     pub fn new(device: &Device, timed: bool) -> Result<Replay> {
         let queries = if timed && device.tick_ns.is_some() {
             let set = device.raw.create_query_set(&wgpu::QuerySetDescriptor {
@@ -120,13 +120,14 @@ impl Replay {
         Ok(Replay { device: device.clone(), queries, labels: Vec::new() })
     }
 
-    /// Runs recordings on what their buffers hold and waits; writes queued before land first.
+    /// Runs recordings on the current content of their buffers and waits. Writes queued earlier are executed first.
     pub fn run(&mut self, recordings: &[&Recording]) -> Result<()> {
         let at = self.submit(&[], recordings, &[])?;
         self.device.wait(Some(at))
     }
 
-    /// Copies `before`, runs the recordings, copies `after`: each copy is (from, its offset, to, its offset, bytes).
+    /// Copies `before`, runs the recordings, copies `after`. Each copy is (source, its offset, target, its offset,
+    /// bytes).
     pub(super) fn submit(
         &mut self,
         before: &[(&Buffer, u64, &Buffer, u64, u64)],
@@ -171,7 +172,7 @@ impl Replay {
         Ok(at)
     }
 
-    /// GPU time of every step of the last submission; waits. Empty without timestamps.
+    /// GPU time of every step of the last submission; waits. Empty if no timestamps were taken.
     pub fn times(&self) -> Result<Vec<StageTime>> {
         let (Some((_, _, staging)), Some(tick)) = (&self.queries, self.device.tick_ns) else {
             return Ok(Vec::new());

@@ -1,5 +1,5 @@
-//! In: bytes for one batch after the other. Out: the bytes that a recording made of each, in order, while
-//! the next batch is already uploaded. Frame and unit: bytes.
+//! In: the bytes of one batch after another. Out: the bytes that a recording computed from each, in order; the next
+//! batch is uploaded at the same time. Frame and unit: bytes.
 
 use super::device::{Fill, Mapping};
 use super::{Buffer, Device, Recording, Replay};
@@ -8,40 +8,40 @@ use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::collections::VecDeque;
 
-/// One place of the ring: what the host fills, what the stages read, what comes back.
+/// One slot of the ring: a batch's input and its results.
 pub struct Slot {
-    /// Written by the host; on unified memory the stages read it where it lies.
+    /// Written by the host; on unified memory the stages read the same memory.
     upload: Buffer,
     /// What the stages read.
     pub input: Buffer,
-    /// Small results with the size of the large ones; written by the stages.
+    /// Small results, which include the sizes of the large ones; written by the stages.
     pub header: Buffer,
     header_staging: Buffer,
-    /// Large results, of each of which only the first part is brought back.
+    /// Large results; only the first part of each is copied to the host.
     pub outputs: Vec<Output>,
-    /// Asked for last: of the upload where the place is free, of the header's staging while a batch is in it.
+    /// The mapping requested last: of `upload` if the slot is free, of `header_staging` while a batch is in it.
     mapping: Option<Mapping>,
-    /// The submission that works on this place.
+    /// The submission that works on this slot.
     at: Option<wgpu::SubmissionIndex>,
 }
 
-/// One large result, and where the host reads it when memory is not shared: as much as a batch in this place needed
-/// so far, for what the stages may write at most is many times that.
+/// One large result, and its copy for the host if memory is not shared. The copy is only as large as the largest result
+/// in this slot so far: the worst case that `buffer` is sized for is many times larger.
 pub struct Output {
     pub buffer: Buffer,
     staging: Option<Buffer>,
-    /// Bytes that are sent back with the next batch.
+    /// Bytes that are copied to the host together with the next batch.
     sent: u64,
 }
 
-/// Bytes that came back, and who copies them.
+/// Bytes that came back, and the threads that copy them.
 pub struct Returned<'a> {
     bytes: &'a [u8],
     copiers: Option<&'a ThreadPool>,
 }
 
 impl Returned<'_> {
-    /// Replaces a list by what the bytes say, in the same memory if it is large enough.
+    /// Replaces the content of a list by the bytes, without a new allocation if the list is large enough.
     pub fn refill<T: bytemuck::Pod>(&self, list: &mut Vec<T>) {
         list.resize(self.bytes.len() / size_of::<T>(), T::zeroed());
         let to: &mut [u8] = bytemuck::cast_slice_mut(list);
@@ -55,13 +55,13 @@ impl Returned<'_> {
     }
 }
 
-/// Batches in flight, oldest first, each with what its owner wants back with it; no buffer is made after the start,
-/// but where results need more room than ever before.
+/// Batches in flight, oldest first, each with a `T` that is returned with its results. No buffer is made after the
+/// start, unless results need more room than ever before.
 pub struct Ring<T> {
     device: Device,
-    /// Copy a batch, and what comes back, together where the device works for itself.
+    /// Threads that together copy a batch and its results; `None` if the stages run on the same cores.
     copiers: Option<ThreadPool>,
-    /// All places, by the number that `fill` and `keep` return.
+    /// All slots, by the number that `fill` and `keep` return.
     pub slots: Vec<Slot>,
     free: VecDeque<usize>,
     busy: VecDeque<(usize, T)>,
@@ -70,26 +70,27 @@ pub struct Ring<T> {
 /// Sizes of a ring in bytes.
 #[derive(Clone, Debug)]
 pub struct RingSizes {
-    /// Places: most batches in flight.
+    /// Number of slots, which is the largest number of batches in flight.
     pub slots: usize,
     /// Bytes of one batch as the stages read it.
     pub input: u64,
     /// Bytes of one batch's small results.
     pub header: u64,
-    /// Most bytes of each large result of one batch.
+    /// Largest size of each large result of one batch.
     pub outputs: Vec<u64>,
 }
 
-/// Part of each output that a device with its own memory sends back with the first batch: 1 MiB is 40 us over PCIe 4.
+/// Part of each output that a device with its own memory copies back with the first batch: over PCIe 4, 1 MiB takes
+/// 40 us.
 const FIRST: u64 = 1 << 20;
 
-/// Bytes of a batch that one thread writes at a time: large enough that handing them over costs little.
+/// Bytes of a batch that one thread writes at a time: large enough that distributing the parts costs little.
 pub const PART: usize = 1 << 20;
 
-/// Threads that copy a batch: eight write hardly more over PCIe 5 than four, for twice the CPU time (decision 0016).
+/// Threads that copy a batch. Eight write hardly faster over PCIe 5 than four, at twice the CPU time (decision 0016).
 const COPIERS: usize = 4;
 
-/// None where the stages run on the same cores, or there is one core only.
+/// `None` if the stages run on the same cores, or there is only one core.
 fn copiers(device: &Device) -> Result<Option<ThreadPool>> {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(COPIERS);
     if threads == 1 || !device.has_own_processors() {
@@ -103,7 +104,7 @@ fn copiers(device: &Device) -> Result<Option<ThreadPool>> {
 }
 
 impl<T> Ring<T> {
-    /// Makes every buffer; `Err` where one is larger than the adapter allows, or the device is lost.
+    /// Makes every buffer. `Err` if one is larger than the adapter allows, or the device is lost.
     pub fn new(device: &Device, sizes: RingSizes) -> Result<Ring<T>> {
         let unified = device.info.unified_memory;
         let mut slots = Vec::new();
@@ -144,16 +145,16 @@ impl<T> Ring<T> {
         })
     }
 
-    /// Batches under way.
+    /// Number of batches in flight.
     pub fn in_flight(&self) -> usize {
         self.busy.len()
     }
-    /// A place is free: without one `fill` and `keep` panic.
+    /// Whether a slot is free. Without one `fill` and `keep` panic.
     pub fn has_room(&self) -> bool {
         !self.free.is_empty()
     }
 
-    /// The next free place, and whether its upload buffer is mapped, for which it waits.
+    /// The next free slot, and whether its upload buffer is mapped; waits for a pending mapping.
     fn next(&mut self) -> Result<(usize, bool)> {
         let at = self.free[0];
         let Some(mapping) = self.slots[at].mapping.take() else { return Ok((at, false)) };
@@ -164,10 +165,9 @@ impl<T> Ring<T> {
         Ok((at, true))
     }
 
-    /// Fills the next free place, which is divided into parts of so many bytes; panics when there is no room. `fill`
-    /// is given the number of a part and a writer (byte offset in the part, bytes), by several threads where they do
-    /// not take the stages' time. Returns the place, whose work is started with `run`; `cargo` comes back with
-    /// `finish`.
+    /// Fills the next free slot, which is divided into parts of the given sizes in bytes; panics if there is no room.
+    /// `fill` receives the number of a part and a writer (byte offset in the part, bytes). Several threads call it if
+    /// that takes no time from the stages. Returns the slot; `run` starts its work. `cargo` is returned by `finish`.
     pub fn fill(&mut self, parts: &[usize], fill: &Fill, cargo: T) -> Result<usize> {
         self.device.alive()?;
         let (at, _) = self.next()?;
@@ -182,7 +182,7 @@ impl<T> Ring<T> {
         Ok(at)
     }
 
-    /// As `fill` with what lies in the next free place since it was last filled.
+    /// Like `fill`, but reuses the content that the next free slot was last filled with.
     pub fn keep(&mut self, cargo: T) -> Result<usize> {
         let (at, open) = self.next()?;
         if open {
@@ -193,7 +193,7 @@ impl<T> Ring<T> {
         Ok(at)
     }
 
-    /// Runs recordings on a filled place; `upload` copies its input to the device where memory is not shared.
+    /// Runs recordings on a filled slot. `upload` copies its input to the device if memory is not shared.
     pub fn run(&mut self, at: usize, replay: &mut Replay, recordings: &[&Recording], upload: bool) -> Result<()> {
         let slot = &mut self.slots[at];
         let before = [(&slot.upload, 0, &slot.input, 0, slot.upload.raw.size())];
@@ -208,7 +208,8 @@ impl<T> Ring<T> {
         Ok(())
     }
 
-    /// The oldest place whose work is done and its cargo, its header written into `header`; waits for it if asked.
+    /// The oldest slot and its cargo, once its work is done. Its header is written into `header`. Waits for the work if
+    /// `wait` is set.
     pub fn oldest(&mut self, wait: bool, header: &mut [u32]) -> Result<Option<(usize, &mut T)>> {
         let Some(at) = self.busy.front().map(|b| b.0) else { return Ok(None) };
         self.device.poll()?;
@@ -226,8 +227,8 @@ impl<T> Ring<T> {
         Ok(self.busy.front_mut().map(|(at, cargo)| (*at, cargo)))
     }
 
-    /// Gives the first `bytes[i]` bytes of each output of the oldest place to `read`, frees the place and gives its
-    /// cargo back.
+    /// Gives the first `bytes[i]` bytes of each output of the oldest slot to `read`, frees the slot and returns its
+    /// cargo.
     pub fn finish(&mut self, bytes: &[u64], mut read: impl FnMut(usize, Returned)) -> Result<T> {
         let (at, cargo) = self.busy.pop_front().expect("a place is busy");
         let (device, copiers, slot) = (&self.device, self.copiers.as_ref(), &mut self.slots[at]);
@@ -243,8 +244,8 @@ impl<T> Ring<T> {
                     encoder.copy_buffer_to_buffer(&output.buffer.raw, 0, &staging.raw, 0, room);
                     device.submit(encoder.finish());
                 }
-                // The next one brings as much with it; less and less where that was noise in one batch.
-                // wgpu copies whole words only, and a half of a half is none by itself.
+                // The next batch copies as much back. The amount halves from batch to batch, in case noise made this
+                // one large. wgpu copies whole words only, which half of a half need not be.
                 let half = (output.sent / 2).next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT);
                 output.sent = room.max(half).max(FIRST).min(staging.raw.size());
             }
@@ -254,7 +255,8 @@ impl<T> Ring<T> {
             }
             let source = output.staging.as_ref().unwrap_or(&output.buffer);
             if let Some(host) = &source.aliased {
-                // SAFETY: the batch is done: its header has come. The next one runs there after this has returned.
+                // SAFETY: the batch is done, because its header has arrived. The next batch uses the memory after this
+                // has returned.
                 read(i, unsafe { host.read(0..bytes as usize) });
                 continue;
             }

@@ -1,9 +1,10 @@
-//! In: a stage's WGSL and the values of its override constants. Out: its tree with these numbers put in, without the
-//! branches that they rule out, reading as texels what has a reader. Frame and unit: none.
+//! In: a stage's WGSL and the values of its override constants. Out: its naga module with these values inserted and
+//! without the branches that they rule out. Arrays that have a reader function are read as texels. Frame and unit:
+//! none.
 //!
-//! A driver first writes out every call and only then finds out what is dead; until then each of its passes works on
-//! all of it. Mesa's software adapter (22.3) pays for that at every start: its cache on disk spares only the machine
-//! code behind it.
+//! A driver first inlines every call and only then finds dead code; until then each of its passes works on all of it.
+//! Mesa's software adapter (22.3) pays for that at every start: its cache on disk saves only the machine code that
+//! follows.
 
 use super::texels::{bind_images, read_texels};
 use naga::back::pipeline_constants::process_overrides;
@@ -16,13 +17,14 @@ pub(super) fn specialised(source: &str, overrides: &[(String, f64)]) -> Module {
     let parsed = naga::front::wgsl::parse_str(source);
     let mut module = parsed.unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
     bind_images(&mut module);
-    // The device validates what comes out; here its types are asked for.
+    // The device validates the result. Here validation only gives the types.
     let types = |module: &Module| {
         let info = Validator::new(ValidationFlags::empty(), Capabilities::all()).validate(module);
         info.unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)))
     };
     let mut info = types(&module);
-    // Before the numbers are put in: what nobody calls is gone after.
+    // Must come before the values are inserted: functions that nobody calls, as the readers are until now, are removed
+    // then.
     if read_texels(&mut module, &info) {
         info = types(&module);
     }
@@ -38,7 +40,7 @@ pub(super) fn specialised(source: &str, overrides: &[(String, f64)]) -> Module {
     module
 }
 
-/// Puts the branch that is taken in place of every `if` whose condition is a constant.
+/// Replaces every `if` with a constant condition by the branch that is taken.
 fn keep_live(block: &mut Block, expressions: &Arena<Expression>) {
     for (mut statement, span) in std::mem::take(block).span_into_iter() {
         match &mut statement {
@@ -88,7 +90,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         assert_eq!(kept(1.0), ["chosen"]);
         assert_eq!(kept(0.0), ["other"]);
         let main = format!("{:?}", specialised(text, &[]).entry_points[0].function.body);
-        // The loop's end, the test of the word, and the break of both; not the choice of the method.
+        // The end of the loop and the test of the word, each with its break; not the choice of the method.
         assert_eq!((main.matches("If {").count(), main.matches("Break").count()), (2, 2), "{main}");
     }
 }

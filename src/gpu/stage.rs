@@ -10,15 +10,15 @@ use std::sync::{Arc, LazyLock, OnceLock};
 use wgpu::naga;
 
 impl Stage {
-    /// The stage's tree with its override constants, reading `Access::Texels` bindings as texels, or as the arrays
-    /// that they are.
+    /// The stage's naga module with its override constants. `Access::Texels` bindings are read as texels if `texels`,
+    /// else as arrays.
     pub fn tree(&self, texels: bool, overrides: &[(String, f64)]) -> naga::Module {
         let source = if texels { readers(self) + &self.source() } else { self.source() };
         specialised(&source, overrides)
     }
 
-    /// The stage with its override constants, compiled on another thread: who uses it first waits for it, or compiles
-    /// it where no thread was free.
+    /// The stage with its override constants, compiled on another thread. The first use waits for the compilation, or
+    /// does it if no thread was free.
     pub fn pipeline(&self, device: &Device, overrides: &[(&str, f64)]) -> Result<Pipeline> {
         let overrides = overrides.iter().map(|&(name, value)| (name.into(), value)).collect();
         let pipeline = self.begun(device, device.reads_texels, overrides);
@@ -26,7 +26,7 @@ impl Stage {
         Ok(pipeline)
     }
 
-    /// Compiled so that it reads arrays as texels, or not.
+    /// Begins to compile the stage; `texels` says whether it reads arrays as texels.
     fn begun(&self, device: &Device, texels: bool, overrides: Vec<(String, f64)>) -> Pipeline {
         let entries: Vec<_> = self
             .bindings
@@ -61,7 +61,7 @@ impl Stage {
         let compile = move || stage.compile(&raw, texels, &bound, &values);
         let compiled: Arc<Compiled> = Arc::new(LazyLock::new(Box::new(compile)));
         let ahead = compiled.clone();
-        // A panic poisons it: who uses it panics as well.
+        // A panic poisons `compiled`, so that its user panics as well.
         device.background.begin(move || {
             LazyLock::force(&ahead);
         });
@@ -77,10 +77,10 @@ impl Stage {
     ) -> wgpu::ComputePipeline {
         let module = std::borrow::Cow::Owned(self.tree(texels, overrides));
         let source = wgpu::ShaderModuleDescriptor { label: Some(self.name), source: wgpu::ShaderSource::Naga(module) };
-        // A counter of turns in every loop keeps the driver from writing short loops out, and takes it longer to
-        // compile.
+        // With a counter in every loop, which this check adds, the driver does not unroll short loops and compiles for
+        // longer.
         let checks = wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..wgpu::ShaderRuntimeChecks::checked() };
-        // SAFETY: every loop ends (tests/shader_contracts.rs); all other checks stay.
+        // SAFETY: every loop ends (tests/shader_contracts.rs); all other checks stay on.
         let module = unsafe { device.create_shader_module_trusted(source, checks) };
         device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(self.name),
@@ -101,25 +101,25 @@ impl Stage {
     }
 }
 
-/// What was compiled, or is yet to be.
+/// A compiled pipeline, or one whose compilation is pending.
 pub(super) type Compiled = LazyLock<wgpu::ComputePipeline, Box<dyn FnOnce() -> wgpu::ComputePipeline + Send>>;
 
-/// A stage with its override constants; clones share what is compiled.
+/// A stage with its override constants; clones share the compiled pipeline.
 #[derive(Clone, Debug)]
 pub struct Pipeline {
-    /// Text, bindings and uniform block of what is compiled.
+    /// Text, bindings and uniform block of the compiled stage.
     pub stage: Stage,
     pub(super) compiled: Arc<Compiled>,
     layout: wgpu::BindGroupLayout,
     texels: bool,
     overrides: Vec<(String, f64)>,
-    /// The same without texels, for arrays that cannot be had as images.
+    /// The same stage without texels, for arrays that cannot be read as images.
     plain: Arc<OnceLock<Pipeline>>,
 }
 
 impl Pipeline {
-    /// Binds buffers, or `(offset, size)` parts of them, in the order of the stage's list; gives what they are bound
-    /// for: the stage without texels where one of them cannot be had as an image.
+    /// Binds buffers, or `(offset, size)` parts of them, in the order of the stage's list. Returns the bind group with
+    /// the pipeline that it fits: the one without texels if a buffer cannot be read as an image.
     pub(super) fn bind(&self, device: &Device, buffers: &[(&Buffer, u64, u64)]) -> (Arc<Compiled>, wgpu::BindGroup) {
         assert_eq!(buffers.len(), self.stage.bindings.len(), "{}: bindings", self.stage.name);
         let resource = |(i, (b, offset, size)): (usize, &(&'_ Buffer, u64, u64))| {
@@ -158,13 +158,13 @@ impl Pipeline {
     }
 }
 
-/// What a binding is bound to: a part of a buffer, or an image of all of it.
+/// What a binding is bound to: a part of a buffer, or an image of the whole buffer.
 enum Bound {
     Buffer(wgpu::Buffer, u64, u64),
     Texels(wgpu::TextureView),
 }
 
-/// What one run of one stage needs: bytes per binding (the uniform's too) and the workgroups.
+/// Input of one run of one stage: bytes per binding (including the uniform block) and the workgroups.
 pub struct Workload {
     /// Bytes of each binding, in the order of the stage's list.
     pub bindings: Vec<Vec<u8>>,

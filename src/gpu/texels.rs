@@ -1,9 +1,9 @@
-//! In: the tree of a stage that reads arrays of words. Out: the same tree reading the same words as texels of an image.
-//! Frame and unit: words of 32 bits, alone or in vectors of 2 or 4.
+//! In: the naga module of a stage that reads arrays of words. Out: the same module, which reads the same words as
+//! texels of an image. Frame and unit: words of 32 bits, alone or in vectors of 2 or 4.
 //!
-//! Mesa's software adapter reads a storage buffer one lane after the other, in a loop with a branch; a texel it
-//! gathers for all lanes at once. Stores are the other way round. So stages write buffers, and read them as images
-//! that lie on the same memory ([`super::alias`]); decision 0012 says how to measure it.
+//! Mesa's software adapter reads a storage buffer one lane after the other, in a loop with a branch. It gathers a texel
+//! for all lanes at once. For stores the buffer is the faster one. So stages write buffers, and read them as images on
+//! the same memory ([`super::alias`]); decision 0012 says how to measure the gain.
 
 use super::description::{Access, Stage};
 use naga::proc::TypeResolution;
@@ -15,8 +15,8 @@ use naga::{
 use std::collections::HashMap;
 use wgpu::naga;
 
-/// Texels a row of such an image, as a power of two: what lies behind each other in the buffer fills row after row.
-/// 16,384 rows, what every adapter has, of single words are 256 MiB.
+/// Texels in a row of such an image, as a power of two: the elements of the buffer fill row after row. 16,384 rows,
+/// which every adapter supports, of single words are 256 MiB.
 pub(super) const ROW_LOG2: u32 = 12;
 
 /// One texel: a word or four.
@@ -50,8 +50,8 @@ impl Texel {
     }
 }
 
-/// An array's element in WGSL, and the texels it is read as: two words a texel take the adapter longer than two
-/// texels of one.
+/// An array's element in WGSL, and the texel as which it is read. Texels of two words are slower on the adapter than
+/// two texels of one word.
 #[derive(Clone, Copy, Debug)]
 struct Element {
     ty: &'static str,
@@ -67,7 +67,7 @@ impl Element {
     fn declaration(self, name: &str) -> String {
         format!("var<storage, read> {name}: array<{}>;", self.ty)
     }
-    /// The image in the array's place, and the function that reads element `i` of it.
+    /// WGSL of the image that replaces the array, and of the function that reads element `i` of it.
     fn reader(self, name: &str) -> String {
         let (mask, shift, format) = ((1 << ROW_LOG2) - 1, ROW_LOG2, self.texel.wgsl());
         let load = |index: &str| format!("textureLoad({name}_image, vec2(({index}) & {mask}u, ({index}) >> {shift}u))");
@@ -84,7 +84,7 @@ impl Element {
     }
 }
 
-/// The element of a binding's array; panics where a stage promises texels of what has none.
+/// The element of a binding's array. Panics if a stage declares `Access::Texels` for any other type.
 fn element_of(stage: &Stage, binding: &str) -> Element {
     let found = ELEMENTS.into_iter().find(|e| stage.wgsl.contains(&e.declaration(binding)));
     found.unwrap_or_else(|| {
@@ -96,19 +96,19 @@ fn element_of(stage: &Stage, binding: &str) -> Element {
     })
 }
 
-/// What a binding's texels are.
+/// The texel as which a binding is read.
 pub(super) fn texel_of(stage: &Stage, binding: &str) -> Texel {
     element_of(stage, binding).texel
 }
 
-/// Images and readers for a stage's `Access::Texels` bindings: [`read_texels`] puts them to use. They stand before
-/// its text, because in the tree functions come after those that they call.
+/// WGSL of images and readers for a stage's `Access::Texels` bindings, used by [`read_texels`]. It is put before the
+/// stage's text, because in a naga module a function comes after those that it calls.
 pub(super) fn readers(stage: &Stage) -> String {
     let bindings = stage.bindings.iter().filter(|b| b.access == Access::Texels);
     bindings.map(|b| element_of(stage, b.name).reader(b.name)).collect()
 }
 
-/// Gives every image that [`readers`] declared the binding of its array, before the tree is validated.
+/// Gives every image of [`readers`] the binding number of its array, before the module is validated.
 pub(super) fn bind_images(module: &mut Module) {
     let bound: HashMap<String, _> = module
         .global_variables
@@ -122,8 +122,8 @@ pub(super) fn bind_images(module: &mut Module) {
     }
 }
 
-/// Every load of an element of an array that has a reader becomes a call of it; the arrays themselves are left
-/// without use. `info` is of this module. Whether there was any.
+/// Replaces every load of an element of an array that has a reader by a call of the reader. The arrays themselves are
+/// then unused. `info` is of this module. Returns whether there were readers.
 pub(super) fn read_texels(module: &mut Module, info: &ModuleInfo) -> bool {
     let reader = |name: &str| module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name)).map(|(h, _)| h);
     let readers: Readers = module
@@ -151,10 +151,10 @@ pub(super) fn read_texels(module: &mut Module, info: &ModuleInfo) -> bool {
     true
 }
 
-/// The function that reads an element of each array.
+/// The function that reads an element, for each array.
 type Readers = HashMap<Handle<GlobalVariable>, Handle<Function>>;
 
-/// A call in place of a load: of this function, with this index.
+/// A call that replaces a load: the function and the index.
 struct Call {
     function: Handle<Function>,
     index: Index,
@@ -179,7 +179,7 @@ fn read_in(f: &mut Function, readers: &Readers, signed: &dyn Fn(Handle<Expressio
             f.expressions[load] = Expression::CallResult(call.function);
             calls.insert(load, call);
         } else {
-            // One component of the element: a step into the value that the call returns.
+            // The load takes one component of the element: it becomes an access to the value that the call returns.
             f.expressions[element] = Expression::CallResult(call.function);
             f.expressions[load] = f.expressions[pointer].clone();
             calls.insert(element, call);
@@ -190,7 +190,8 @@ fn read_in(f: &mut Function, readers: &Readers, signed: &dyn Fn(Handle<Expressio
     }
 }
 
-/// The step of a chain of accesses that takes an element of an array with a reader, and the call in its place.
+/// The expression in a chain of accesses that selects an element of an array with a reader, and the call that replaces
+/// it.
 fn element_of_array(
     expressions: &Arena<Expression>,
     pointer: Handle<Expression>,
@@ -207,7 +208,8 @@ fn element_of_array(
     }
 }
 
-/// Calls are statements: each stands where the load stood among the expressions that are evaluated in one go.
+/// Inserts the calls. A call is a statement, so it splits the range of expressions that were evaluated together where
+/// the load was.
 fn put_calls(
     block: &mut Block,
     expressions: &mut Arena<Expression>,
@@ -300,10 +302,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         assert_eq!(["list_image", "pairs_image", "plain", "out"].map(bound), [0, 1, 2, 3].map(Some));
         assert_eq!(["list", "pairs"].map(bound), [None, None]);
         let body = format!("{:?}", module.entry_points[0].function.body);
-        // list twice and once in the loop, pairs twice in the loop and once, and the function that calls a reader
-        // itself.
+        // `list` twice and once in the loop; `pairs` twice in the loop and once; and the call of `twice`, which calls a
+        // reader.
         assert_eq!(body.matches("Call {").count(), 7, "{body}");
-        // As it stands nothing is changed.
+        // Without readers nothing changes.
         assert!(format!("{:?}", specialised(TEXT, &[]).entry_points[0].function.body).matches("Call {").count() == 1);
     }
 }

@@ -1,12 +1,12 @@
-//! In: a device. Out: whether its buffers can be read as texels, tried once with each kind.
-//! Frame and unit: words.
+//! In: a device. Out: whether its buffers can be read as texels, from one trial with each kind of texel. Frame and
+//! unit: words.
 
 use super::description::{Access, Binding, Field, Stage};
 use super::texels::{ROW_LOG2, Texel};
 use super::{Device, Recording, Replay};
 use crate::fault::Result;
 
-/// Whether a buffer can be had as texels of every kind, and they are what was written, one dispatch after the other.
+/// Whether a buffer can be read as texels of every kind, and a dispatch reads what the dispatch before it wrote.
 pub(super) fn trial(device: &Device) -> Result<bool> {
     let mut device = device.clone();
     device.reads_texels = true;
@@ -17,7 +17,7 @@ pub(super) fn trial(device: &Device) -> Result<bool> {
     written_and_read(&device)
 }
 
-/// Writes a buffer and reads it in every way.
+/// Writes a buffer, reads it as every kind of element and compares.
 fn written_and_read(device: &Device) -> Result<bool> {
     const WORDS: u32 = 3 << (ROW_LOG2 + 2); // three rows of the largest texels
     const UNIFORM: (&str, &[Field], usize) = ("", &[], 0);
@@ -71,7 +71,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
 mod tests {
     use super::*;
 
-    /// An array too large for an image is read as every other adapter reads it.
+    /// An array that is too large for an image is read as a buffer, as on every other adapter.
     #[test]
     fn a_stage_runs_without_texels_where_no_image_can_be_had() {
         let Some(mut device) = Device::with_texels_for_tests() else { return };

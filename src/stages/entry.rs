@@ -1,29 +1,29 @@
-//! In: a stage, its CPU twin and its cases. Out: how far the GPU and the twin are apart.
-//! Frame and unit: words of the stage's bindings; the difference's unit is the stage's own.
+//! In: a stage, its CPU twin and its cases. Out: the difference between the GPU and the twin. Frame and unit: words of
+//! the stage's bindings; the difference has the stage's own unit.
 
 use super::same::Same;
 use super::step::Twin;
 use crate::fault::Result;
 use crate::gpu::{Device, Pipeline, Stage, Workload, run_once};
 
-/// One stage as the tests and `sheetlight doctor` see it.
+/// One stage with what the tests and `sheetlight doctor` need.
 pub struct Entry {
     /// The shader with its bindings.
     pub stage: &'static Stage,
     /// The same arithmetic on the CPU.
     pub twin: Twin,
-    /// Makes the inputs that the two are compared on.
+    /// Makes the inputs on which the two are compared.
     pub cases: Box<dyn Fn() -> Vec<Case> + Send + Sync>,
-    /// How far the two may be apart.
+    /// How much the two may differ.
     pub same: Same,
 }
 
 /// Input of one run of a stage.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// What the input shows, for messages.
+    /// Description of the input, for messages.
     pub name: String,
-    /// Override constants that the pipeline is built with: name, value.
+    /// Override constants with which the pipeline is built: name, value.
     pub overrides: Vec<(&'static str, f64)>,
     /// Words of each binding in the stage's order, the uniform block first.
     pub bindings: Vec<Vec<u32>>,
@@ -31,25 +31,25 @@ pub struct Case {
     pub groups: [u32; 3],
 }
 
-/// What the comparison of one stage gave.
+/// Result of the comparison of one stage.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Verdict {
     /// Name of the stage.
     pub stage: &'static str,
-    /// How many cases ran.
+    /// Number of cases that ran.
     pub cases: usize,
-    /// Of all cases, in the stage's own unit.
+    /// Largest difference over all cases, in the stage's own unit.
     pub largest_difference: f64,
-    /// Largest difference allowed, in the same unit; 0 where every word counts.
+    /// Largest difference allowed, in the same unit; 0 if every word must be equal.
     pub limit: f64,
-    /// Why results within the limit count as the same.
+    /// Reason why results within the limit count as equal.
     pub reason: &'static str,
     /// The case with the largest difference.
     pub worst_case: String,
 }
 
 impl Verdict {
-    /// No case is further apart than the limit.
+    /// Whether no case differs by more than the limit.
     pub fn passed(&self) -> bool {
         self.largest_difference <= self.limit
     }
@@ -61,9 +61,9 @@ impl Entry {
         self.judge(device, (self.cases)())
     }
 
-    /// The same with other cases.
+    /// Like `verify`, with different cases.
     pub fn judge(&self, device: &Device, cases: Vec<Case>) -> Result<Verdict> {
-        // Cases with the same constants share what is compiled for them.
+        // Cases with the same constants share a compiled pipeline.
         let mut compiled: Vec<(Vec<(&str, f64)>, Pipeline)> = Vec::new();
         let mut verdict = Verdict {
             stage: self.stage.name,

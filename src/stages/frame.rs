@@ -1,5 +1,5 @@
-//! In: the size and depth of the pictures, the settings. Out: the uniform block of the stripe stages and
-//! the layout of their buffers. Frame and unit: pixels, words of 32 bits.
+//! In: the size and depth of the pictures, the settings. Out: the uniform block of the stripe stages and the layout of
+//! their buffers. Frame and unit: pixels, words of 32 bits.
 
 use super::{ThresholdParams, Window};
 use crate::fault::{Fault, Result};
@@ -11,9 +11,9 @@ use std::ops::Range;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Frame {
-    /// px
+    /// Width of a picture, px.
     pub width: u32,
-    /// px
+    /// Height of a picture, px.
     pub height: u32,
     /// Words of one picture row, padded to whole tiles.
     pub pitch: u32,
@@ -27,7 +27,7 @@ pub struct Frame {
     pub shots: u32,
     /// Edge of the threshold's window, px, odd.
     pub size: u32,
-    /// What a lit pixel exceeds the window's mean by, grey levels of the picture's depth; may be negative.
+    /// Amount by which a lit pixel exceeds the window's mean, grey levels of the picture's depth; may be negative.
     pub offset: i32,
     /// Least level of a lit pixel, grey levels of the picture's depth.
     pub minimum: u32,
@@ -35,18 +35,18 @@ pub struct Frame {
     pub flags: u32,
     /// Sub-iteration of thinning, counted from 0.
     pub step: u32,
-    /// Most skeleton pixels that a batch keeps.
+    /// Most skeleton pixels that a batch can store.
     pub capacity: u32,
     /// Grey level of saturation.
     pub full_scale: u32,
-    /// Most pixels added to an end of a line, and from bit 16 on the share of brightness in 4096ths; 0 is off.
+    /// Most pixels added to an end of a line, and from bit 16 on the least share of brightness in 4096ths; 0 is off.
     pub lengthen: u32,
-    /// Pixels from one of a run across the stripe to the next ([`crate::stages::stripe::spacing::word`]), and whether
-    /// lit pixels need company ([`crate::stages::stripe::spacing::COMPANY`]); 0 keeps all.
+    /// Distance between the pixels of a run across the stripe that stay, px ([`crate::stages::stripe::spacing::word`]);
+    /// and whether isolated lit pixels are excluded ([`crate::stages::stripe::spacing::COMPANY`]). 0 keeps all.
     pub spacing: u32,
 }
 
-/// `Frame::flags`: list every tile, the plain path.
+/// `Frame::flags`: every tile is listed, which is the plain path.
 pub const ALL_TILES: u32 = 1;
 /// `Frame::flags`: a region of interest is given.
 pub const HAS_ROI: u32 = 2;
@@ -73,10 +73,10 @@ pub(crate) const SHARED: &str =
 pub(crate) const COLUMNS: &str = include_str!("../../shaders/shared/columns.wgsl");
 pub(crate) const PIXELS: &str = include_str!("../../shaders/shared/pixels.wgsl");
 pub(crate) const ACTIVITY: &str = include_str!("../../shaders/shared/activity.wgsl");
-/// Selects 8-bit (2) or deeper (1) pictures; pixels a word as a power of two.
+/// Pixels per word as a power of two: 2 for 8-bit pictures, 1 for deeper ones.
 pub const PX_LOG2: &str = "px_log2";
 
-/// The value of the override [`PX_LOG2`] for pictures of so many bits.
+/// The value of the override [`PX_LOG2`] for pictures of this depth.
 pub fn px_log2(bits: u8) -> u32 {
     if bits == 8 { 2 } else { 1 }
 }
@@ -85,7 +85,7 @@ impl Frame {
     /// The layout of `shots` pictures of one size and depth in one batch.
     pub fn new(width: u32, height: u32, bits: u8, shots: u32, p: &ThresholdParams) -> Result<Frame> {
         p.check()?;
-        // A tile packs its column into 10 bits, its row into 12, its shot into 10; a point its pixel into 16 + 16.
+        // A tile has 10 bits for its column, 12 for its row, 10 for its shot; a pixel has 16 + 16 bits.
         if !(1..=32 * 1023).contains(&width) || !(1..=8 * 4095).contains(&height) {
             return Err(Fault::input(format!(
                 "a picture of {width} x {height} pixels, 1 x 1 to 32736 x 32760 are possible"
@@ -102,8 +102,8 @@ impl Frame {
         }
         let (tiles_x, tiles_y) = (width.div_ceil(32), height.div_ceil(8));
         let pitch = (tiles_x * 32) >> px_log2(bits);
-        // One skeleton pixel in twenty, over the whole batch, is more than a scene with a stripe ever gives: 24 lines
-        // across a picture of 480 rows. A small picture keeps all.
+        // One pixel in twenty, over the complete batch, is more than the skeleton of a scene with a stripe ever has: it
+        // would be 24 lines across a picture of 480 rows. A small picture can store all its pixels.
         let a_shot = (u64::from(width) * u64::from(height) / 20).max((u64::from(width) * u64::from(height)).min(32768));
         let capacity = u32::try_from(a_shot * u64::from(shots)).map_err(|_| {
             Fault::usage(format!("{shots} shots of {width} x {height} pixels in one batch: their list has no room"))
@@ -128,11 +128,11 @@ impl Frame {
             spacing: 0,
         })
     }
-    /// Tiles of all pictures of a batch.
+    /// Number of tiles in all pictures of a batch.
     pub fn tiles(&self) -> u32 {
         self.tiles_x * self.tiles_y * self.shots
     }
-    /// Words of a mask of a whole batch, 8 a tile.
+    /// Words of a mask of a complete batch, 8 per tile.
     pub fn mask_words(&self) -> u32 {
         self.tiles() * 8
     }
@@ -140,7 +140,7 @@ impl Frame {
     pub fn image_bytes(&self) -> usize {
         self.shot_words as usize * 4
     }
-    /// The settings that it was made from.
+    /// The threshold settings of the frame.
     pub fn threshold(&self) -> ThresholdParams {
         ThresholdParams {
             window: if self.flags & GAUSSIAN != 0 { Window::Gaussian } else { Window::Mean },
@@ -150,8 +150,8 @@ impl Frame {
         }
     }
 
-    /// Hands rows of a picture to `put` piece by piece (byte offset behind the first of them, bytes): padded to whole
-    /// tiles with their last pixel.
+    /// Passes rows of a picture to `put` piece by piece (byte offset from the first of these rows, bytes). Rows are
+    /// padded to whole tiles with their last pixel.
     pub fn put_rows(&self, image: &Image, rows: Range<u32>, put: &mut dyn FnMut(usize, &[u8])) -> Result<()> {
         self.accept(image)?;
         let (bytes, px): (&[u8], usize) = match &image.pixels {
@@ -173,12 +173,12 @@ impl Frame {
         Ok(())
     }
 
-    /// A whole picture, into a slice of `image_bytes()`.
+    /// Writes a picture into a slice of `image_bytes()` bytes.
     pub fn pack_image(&self, image: &Image, out: &mut [u8]) -> Result<()> {
         self.put_rows(image, 0..self.height, &mut |at, bytes| out[at..at + bytes.len()].copy_from_slice(bytes))
     }
 
-    /// Refuses a picture of another size or depth.
+    /// Returns an error for a picture of a different size or depth.
     pub fn accept(&self, image: &Image) -> Result<()> {
         let full = u32::from(image.full_scale());
         if (image.width, image.height, full) == (self.width, self.height, self.full_scale) {
@@ -197,7 +197,7 @@ impl Frame {
         .next("move them into a recording of their own"))
     }
 
-    /// One shot's mask out of a batch's mask words.
+    /// One shot's mask from the mask words of a batch.
     pub fn unpack_mask(&self, words: &[u32], shot: u32) -> Mask {
         let place = |y: u32| (0..self.tiles_x).map(move |i| self.mask_word(shot, 32 * i, y));
         let words = (0..self.height).flat_map(place).map(|at| words[at]).collect();
@@ -212,13 +212,13 @@ impl Frame {
         }
         words
     }
-    /// Place of a pixel's word in a mask; its bit is x % 32.
+    /// Index of a pixel's word in a mask; its bit is x % 32.
     pub fn mask_word(&self, shot: u32, x: u32, y: u32) -> usize {
         (8 * ((shot * self.tiles_y + y / 8) * self.tiles_x + x / 32) + y % 8) as usize
     }
 }
 
-/// Tile x, y, shot out of a list's word.
+/// Tile x, tile y and shot from a word of a list.
 pub fn tile_unpack(tile: u32) -> (u32, u32, u32) {
     (tile & 1023, tile >> 10 & 4095, tile >> 22)
 }

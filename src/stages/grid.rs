@@ -1,69 +1,70 @@
-//! In: points of a cloud, a grid's place. Out: integer sums of one surface in each cell of a height map.
-//! Frame and unit: points in the base frame, mm; cells and heights in whole steps of the grid frame. Nothing but whole
-//! numbers, in sums and maxima: the cells are the same on every machine, in whatever order the points come.
+//! In: points of a cloud, a grid's pose. Out: integer sums of one surface in each cell of a height map. Frame and unit:
+//! points in the base frame, mm; cells and heights in whole steps of the grid frame. Only sums and maxima of whole
+//! numbers: the cells are the same on every machine and for any order of the points.
 
 use super::entry::Case;
 use crate::geometry::{Base, Grid, Rigid, Vec3};
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Field, Stage};
 
-/// Where the cells lie, as whole numbers; the WGSL struct of the same name, shaders/shared/grid.wgsl.
+/// Layout of the cells in whole numbers; the WGSL struct of the same name, shaders/shared/grid.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct GridFrame {
-    /// Cells.
+    /// Cells along the grid's x axis.
     pub width: u32,
     /// Cells along the grid's y axis.
     pub height: u32,
-    /// Two surfaces where a cell spans more height steps than this.
+    /// A cell that spans more height steps than this contains two surfaces.
     pub layer_steps: i32,
-    /// Points at hand.
+    /// Number of points.
     pub points: u32,
-    /// Bits of the least quality; of numbers that are not negative the bits have the order of the numbers.
+    /// Bits of the least quality: the bits of numbers that are not negative have the order of the numbers.
     pub least_quality: i32,
-    /// The grid's origin in the base frame, 2⁻¹⁴ mm, at most 2³⁰ of them: differences stay within 32 bits.
+    /// The grid's origin in the base frame, in units of 2⁻¹⁴ mm, at most 2³⁰ of them: differences stay within 32 bits.
     pub origin_x: i32,
     /// The same along the base's y axis.
     pub origin_y: i32,
     /// The same along the base's z axis.
     pub origin_z: i32,
-    /// Rows of the rotation over the cell's edge and the height step, each times a power of two that fills 30 bits.
+    /// Rows of the rotation over the cell's edge or the height step, each times a power of two with which it fills 30
+    /// bits.
     pub xx: i32,
-    /// Cells along x for a way along the base's y axis.
+    /// Cells along x per distance along the base's y axis.
     pub xy: i32,
-    /// Cells along x for a way along the base's z axis.
+    /// Cells along x per distance along the base's z axis.
     pub xz: i32,
-    /// Cells along y for a way along the base's x axis.
+    /// Cells along y per distance along the base's x axis.
     pub yx: i32,
-    /// Cells along y for a way along the base's y axis.
+    /// Cells along y per distance along the base's y axis.
     pub yy: i32,
-    /// Cells along y for a way along the base's z axis.
+    /// Cells along y per distance along the base's z axis.
     pub yz: i32,
-    /// Height steps for a way along the base's x axis.
+    /// Height steps per distance along the base's x axis.
     pub zx: i32,
-    /// Height steps for a way along the base's y axis.
+    /// Height steps per distance along the base's y axis.
     pub zy: i32,
-    /// Height steps for a way along the base's z axis.
+    /// Height steps per distance along the base's z axis.
     pub zz: i32,
-    /// That power and the 14 places of the positions.
+    /// Exponent of that power of two plus the 14 binary places of positions.
     pub shift_x: u32,
     /// The same for the cells along y.
     pub shift_y: u32,
     /// The same for the height steps.
     pub shift_z: u32,
-    /// The 64-bit offset of the cells along x, low 32 bits: what the origin was rounded by.
+    /// The 64-bit offset of the cells along x, low 32 bits: it corrects the rounding of the origin.
     pub add_x_low: u32,
-    /// The high 32 bits of it.
+    /// The high 32 bits of that offset.
     pub add_x_high: u32,
     /// The same for the cells along y, low 32 bits.
     pub add_y_low: u32,
-    /// The high 32 bits of it.
+    /// The high 32 bits of that offset.
     pub add_y_high: u32,
-    /// The same for the height steps and half a step, low 32 bits.
+    /// The same for the height steps, plus half a step, low 32 bits.
     pub add_z_low: u32,
-    /// The high 32 bits of it.
+    /// The high 32 bits of that offset.
     pub add_z_high: u32,
-    /// Binary places of intensities: 4, or 0 where a sensor of 13 bits and more would saturate the terms.
+    /// Binary places of intensities: 4, or 0 if a sensor of 13 bits or more would saturate the terms.
     pub intensity_places: i32,
     /// Always 0: fills the block to a multiple of 16 bytes.
     pub reserved: u32,
@@ -74,18 +75,18 @@ const UNIFORM: (&str, &[Field], usize) = super::frame::uniform_fields!(GridFrame
     origin_x, origin_y, origin_z, xx, xy, xz, yx, yy, yz, zx, zy, zz, shift_x, shift_y, shift_z, add_x_low, add_x_high,
     add_y_low, add_y_high, add_z_low, add_z_high, intensity_places, reserved);
 
-/// Binary places of positions: 0.06 µm.
+/// Binary places of positions, mm: steps of 0.06 µm.
 const POSITION_PLACES: i32 = 14;
-/// What a sum of sigmas is worth, mm; each of its terms saturates at 65,461 of them.
+/// Unit of a sum of sigmas, mm; each term saturates at 65,461 units.
 pub const SIGMA_STEP: f64 = 1e-4;
 /// Largest integer height; the sum over [`COUNT_MOST`] points fits an i32.
 pub const Z_MOST: i32 = 32_767;
-/// More points in one cell and its sums could overflow.
+/// With more points than this in one cell its sums could overflow.
 pub const COUNT_MOST: u32 = 65_535;
 /// Words of a point: x y z sigma intensity quality shot u v.
 pub const RECORD: usize = 9;
-/// Magnitudes from here on (32 m) are outside of every grid; so are points that far from the origin, whose
-/// coordinates could leave 32 bits.
+/// Positions of at least this magnitude (32 m) are outside of every grid. So are points at that distance from the
+/// origin, whose coordinates could exceed 32 bits.
 pub(in crate::stages) const BEYOND: i32 = 0x2000_0000;
 
 /// Sums of the points of one surface in one cell.
@@ -96,7 +97,7 @@ pub struct Layer {
     pub count: u32,
     /// Sum of heights above the grid's plane, height steps.
     pub z: i32,
-    /// Sum of grey levels in units of [`GridFrame::intensity_step`]; each term saturates at 65,535 of them.
+    /// Sum of grey levels in units of [`GridFrame::intensity_step`]; each term saturates at 65,535 units.
     pub intensity: u32,
     /// Sum of the points' standard deviations in units of [`SIGMA_STEP`].
     pub sigma: u32,
@@ -114,7 +115,7 @@ impl Layer {
 }
 
 impl GridFrame {
-    /// `cell` and `z_step` in mm, at least 0.0001 and 1 / 32767; no points yet.
+    /// `cell` and `z_step` are in mm, at least 0.0001 and 1 / 32767. The frame has no points yet.
     pub fn new(
         base_from_grid: &Rigid<Base, Grid>,
         [width, height]: [u32; 2],
@@ -171,17 +172,17 @@ impl GridFrame {
         }
     }
 
-    /// What a sum of intensities is worth, grey levels.
+    /// Unit of a sum of intensities, grey levels.
     pub fn intensity_step(&self) -> f64 {
         1.0 / f64::from(1 << self.intensity_places)
     }
 
-    /// Width times height.
+    /// Number of cells: width times height.
     pub fn cells(&self) -> usize {
         self.width as usize * self.height as usize
     }
 
-    /// Cell of a point, and its height + 32,768; `None` outside the grid.
+    /// Index of a point's cell, and the point's height + 32,768; `None` outside the grid.
     fn place(&self, p: &[u32]) -> Option<(usize, u32)> {
         let q = [p[0], p[1], p[2]].map(|bits| fixed(bits, POSITION_PLACES));
         let d: [i32; 3] = std::array::from_fn(|i| q[i] - [self.origin_x, self.origin_y, self.origin_z][i]);
@@ -201,7 +202,7 @@ impl GridFrame {
             .then(|| (y as usize * self.width as usize + x as usize, (z + i64::from(Z_MOST) + 1) as u32))
     }
 
-    /// First pass: lowest and highest point of each cell, as `span_of` reads them.
+    /// First pass: lowest and highest point of each cell, in the format that `sum` and `pick` read.
     pub fn span(&self, records: &[u32], span: &mut [[u32; 2]]) {
         for (cell, z) in records.chunks_exact(RECORD).take(self.points as usize).filter_map(|p| self.place(p)) {
             let [low, high] = &mut span[cell];
@@ -224,7 +225,7 @@ impl GridFrame {
         }
     }
 
-    /// One surface of each cell: of two the one with more points, the upper one in a tie.
+    /// One surface of each cell. Of two surfaces it is the one with more points, the upper one in a tie.
     pub fn pick(&self, [low, high]: [u32; 2], [below, above]: [Layer; 2]) -> Layer {
         let two = (low + high) as i32 - 65_536 > self.layer_steps;
         match two {
@@ -235,7 +236,7 @@ impl GridFrame {
     }
 }
 
-/// The bits of an f32 as a multiple of 2^-places, rounded; what is too large, or no number, is [`BEYOND`].
+/// The bits of an f32 as a multiple of 2^-places, rounded. A number that is too large, and NaN, give [`BEYOND`].
 fn fixed(bits: u32, places: i32) -> i32 {
     let exponent = (bits >> 23 & 255) as i32;
     let mantissa = bits & 0x7f_ffff | 0x80_0000;
@@ -267,19 +268,19 @@ const fn stage(name: &'static str, wgsl: &'static str, bindings: &'static [Bindi
 const FRAME: Binding = Binding { name: "frame", access: Uniform };
 const RECORDS: Binding = Binding { name: "records", access: Texels };
 
-/// Lowest and highest point of each cell; one invocation a point.
+/// Lowest and highest point of each cell; one invocation per point.
 pub const SPAN: Stage = stage(
     "grid_span",
     include_str!("../../shaders/grid_span.wgsl"),
     &[FRAME, RECORDS, Binding { name: "span", access: ReadWrite }],
 );
-/// Sums below and above the middle of each cell's span; one invocation a point.
+/// Sums below and above the middle of each cell's span; one invocation per point.
 pub const SUM: Stage = stage(
     "grid_sum",
     include_str!("../../shaders/grid_sum.wgsl"),
     &[FRAME, RECORDS, Binding { name: "span", access: Texels }, Binding { name: "layers", access: ReadWrite }],
 );
-/// Sums of one surface in each cell; one invocation a cell.
+/// Sums of one surface in each cell; one invocation per cell.
 pub const PICK: Stage = stage(
     "grid_pick",
     include_str!("../../shaders/grid_pick.wgsl"),
@@ -291,12 +292,12 @@ pub const PICK: Stage = stage(
     ],
 );
 
-/// One invocation a point.
+/// Workgroups for one invocation per point.
 pub fn point_groups(points: u32) -> [u32; 3] {
     [points.div_ceil(64).max(1), 1, 1]
 }
 
-/// One invocation a cell; more than 65,535 groups lie in further rows.
+/// Workgroups for one invocation per cell; with more than 65,535 groups they are in several rows.
 pub fn cell_groups(f: &GridFrame) -> [u32; 3] {
     let groups = (f.cells() as u32).div_ceil(64).max(1);
     [groups.min(65_535), groups.div_ceil(65_535), 1]
@@ -328,8 +329,8 @@ pub(crate) fn pick_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-/// Cases of one of the three stages: a tilted plate with a block and strays far from the base's origin, all points in
-/// one cell, numbers that are not finite.
+/// Cases of one of the three stages: a tilted plate with a block and strays far from the base's origin; all points in
+/// one cell; numbers that are not finite.
 pub fn cases(stage: &str) -> Vec<Case> {
     let mut noise = super::noise::Noise(11);
     let mut normal = |sigma: f64| sigma * noise.normal();
@@ -408,7 +409,7 @@ mod tests {
             let words = [p.x, p.y, p.z, 0.01, 10.0, 1.0].map(f32::to_bits);
             let (at, z) = f.place(&words).expect("inside");
             let seen = pose.inverse().point(&p.map(f64::from));
-            // The positions' own step is 0.06 µm; a point nearer than that to a cell's edge may fall on either side.
+            // The positions have a step of 0.06 µm; a point closer than that to a cell's edge may fall on either side.
             let off = |i: usize, axis: f64| (axis / cell - i as f64 - 0.5).abs() * cell - 0.5 * cell;
             assert!(off(at % 900, seen.x) < 2e-4 && off(at / 900, seen.y) < 2e-4, "{at} {seen}");
             assert!((f64::from(z) - 32_768.0 - seen.z / step).abs() < 0.5 + 2e-4 / step, "{z} {seen}");

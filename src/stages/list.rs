@@ -1,5 +1,4 @@
-//! In: the chain's table, the stages beside it. Out: every stage with its twin, its cases and how far the two may be
-//! apart.
+//! In: the chain's table, the stages beside it. Out: every stage with its twin, its cases and the allowed difference.
 //! Frame and unit: each stage's own.
 
 use super::chain::table::steps;
@@ -11,7 +10,7 @@ use super::stripe::{choose, hough, point};
 use super::{cases, grid, peak, support};
 use crate::gpu::Stage;
 
-/// Every stage; tests and the self-test of `sheetlight doctor` run over it.
+/// Every stage; tests and the self-test of `sheetlight doctor` run all of them.
 pub fn all() -> Vec<Entry> {
     let of_chain = |s: &Step| Entry {
         stage: s.stage,

@@ -1,21 +1,21 @@
-//! In: lists of tiles and what became of them. Out: emptied, shortened, restarted lists: the stages
-//! reset, clear, compact and rebase. Frame and unit: tiles of 32 x 8 pixels.
+//! In: lists of tiles. Out: lists that are emptied, shortened or restarted, by the stages reset, clear, compact and
+//! rebase. Frame and unit: tiles of 32 x 8 pixels.
 
 use super::frame::{self, ACTIVITY, Frame, PX_LOG2, frame_of, tile_unpack};
 use crate::gpu::{Access::*, Binding, Stage};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
-/// WGSL names of the words below.
+/// WGSL of the constants below.
 pub(crate) const SHARED: &str = include_str!("../../shaders/shared/listing.wgsl");
-/// Word of a list's header: workgroups of 64 entries, the first of three arguments of a dispatch.
+/// Word of a list's header: workgroups of 64 entries, the first of a dispatch's three arguments.
 pub const GROUPS: usize = 0;
-/// Word of a list's header: entries.
+/// Word of a list's header: number of entries.
 pub const COUNT: usize = 3;
-/// Words between the headers of two lists: 256 bytes, which every adapter can bind.
+/// Words between the headers of two lists: 256 bytes, an offset at which every adapter can bind.
 pub const HEADER_WORDS: u32 = 64;
 
-/// Empties list headers; at a further round of thinning (step 1) only those of the shortened lists.
+/// Empties list headers; in a further round of thinning (step 1) only those of the shortened lists.
 pub const RESET: Stage = Stage {
     name: "reset",
     wgsl: include_str!("../../shaders/reset.wgsl"),
@@ -41,7 +41,7 @@ pub const RESETTING: Step = Step {
     same: Same::Words,
 };
 
-/// Zeroes masks, stamps and counts of the tiles that the last batch listed; one invocation a tile.
+/// Zeroes masks, stamps and counts of the tiles that the last batch listed; one invocation per tile.
 pub const CLEAR: Stage = Stage {
     name: "clear",
     wgsl: include_str!("../../shaders/clear.wgsl"),
@@ -58,7 +58,7 @@ pub const CLEAR: Stage = Stage {
     ..RESET
 };
 
-/// Empties the tiles that the last batch listed.
+/// Zeroes the tiles that the last batch listed.
 pub const CLEARING: Step = Step {
     stage: &CLEAR,
     twin: clear_twin,
@@ -67,7 +67,7 @@ pub const CLEARING: Step = Step {
     same: Same::Words,
 };
 
-/// Lists the lit tiles that changed in the last two sub-iterations, or lie beside one; one invocation a tile.
+/// Lists the lit tiles that changed in the last two sub-iterations, or lie beside such a tile; one invocation per tile.
 pub const COMPACT: Stage = Stage {
     name: "compact",
     wgsl: include_str!("../../shaders/compact.wgsl"),
@@ -83,7 +83,7 @@ pub const COMPACT: Stage = Stage {
     ..RESET
 };
 
-/// Shortens the list to the tiles that still change.
+/// Shortens the list to the tiles that may still change.
 pub const COMPACTING: Step = Step {
     stage: &COMPACT,
     twin: compact_twin,
@@ -92,7 +92,7 @@ pub const COMPACTING: Step = Step {
     same: Same::Lists(&[(5, 1)]),
 };
 
-/// Zeroes the stamps of the lit tiles; one invocation a tile.
+/// Zeroes the stamps of the lit tiles; one invocation per tile.
 pub const REBASE: Stage = Stage {
     name: "rebase",
     wgsl: include_str!("../../shaders/rebase.wgsl"),
@@ -105,7 +105,7 @@ pub const REBASE: Stage = Stage {
     ..RESET
 };
 
-/// Makes the stamps of a round those before a further one.
+/// Resets the stamps after a round, before a further one.
 pub const REBASING: Step = Step {
     stage: &REBASE,
     twin: rebase_twin,
@@ -114,24 +114,24 @@ pub const REBASING: Step = Step {
     same: Same::Words,
 };
 
-/// Adds an entry, a tile or a run of them: [`COUNT`] of the header counts, [`GROUPS`] is the number of workgroups of
-/// 64 entries.
+/// Appends an entry, which is a tile or a run of tiles. [`COUNT`] of the header is the number of entries, [`GROUPS`]
+/// the number of workgroups of 64 entries.
 pub fn append<const N: usize>(listing: &mut [u32], list: &mut [u32], entry: [u32; N]) {
     list[N * listing[COUNT] as usize..][..N].copy_from_slice(&entry);
     listing[GROUPS] += u32::from(listing[COUNT].is_multiple_of(64));
     listing[COUNT] += 1;
 }
 
-/// Place of a tile in arrays that hold every tile.
+/// Index of a tile in arrays that contain every tile.
 pub fn tile_index(f: &Frame, tile: u32) -> usize {
     let (x, y, shot) = tile_unpack(tile);
     ((shot * f.tiles_y + y) * f.tiles_x + x) as usize
 }
-/// Place of a tile's row in a mask.
+/// Index of a tile's row in a mask.
 pub fn mask_index(f: &Frame, tile: u32, row: u32) -> usize {
     8 * tile_index(f, tile) + row as usize
 }
-/// Places of a tile and its neighbours.
+/// Indices of a tile and its neighbours.
 pub fn near_tiles(f: &Frame, tile: u32) -> impl Iterator<Item = usize> {
     let (x, y, shot) = tile_unpack(tile);
     let near = |v: u32, n: u32| v.saturating_sub(1)..=(v + 1).min(n - 1);

@@ -1,5 +1,5 @@
-//! In: grey pictures of the stripe. Out: the steps that find it, each as a WGSL stage with its CPU twin.
-//! Frame and unit: image pixels (x right, y down, an integer is a pixel's centre), grey levels.
+//! In: grey pictures of the stripe. Out: the steps from them to points, each as a WGSL stage with its CPU twin. Frame
+//! and unit: image pixels (x right, y down, an integer is a pixel's centre), grey levels.
 
 pub mod cases;
 pub mod chain;

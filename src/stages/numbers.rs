@@ -1,5 +1,5 @@
-//! In: the constants of the stages. Out: those that a shader names too, by its names: each is stated once here and
-//! once there, and tests/shader_contracts.rs compares them. Frame and unit: each number's own.
+//! In: the constants of the stages. Out: those that a shader also states, with their names there. Each is stated once
+//! in Rust and once in WGSL, and tests/shader_contracts.rs compares them. Frame and unit: each number's own.
 
 use super::frame::{ALL_TILES, GAUSSIAN, HAS_ROI};
 use super::listing::{self, HEADER_WORDS};
@@ -9,7 +9,7 @@ use super::peak::{fit, methods, profile, scoring};
 use super::stripe::{point, skeleton, spacing};
 use super::{grid, support};
 
-/// The shader that names it (empty: a shared text), its name there, its value here.
+/// The shader that states it (empty: a shared text), its name there, its value in Rust.
 pub const NUMBERS: &[(&str, &str, f64)] = &[
     ("", "GROUPS", listing::GROUPS as f64),
     ("", "GROUPS_Y", listing::GROUPS as f64 + 1.0),

@@ -1,20 +1,20 @@
-//! In: what a GPU and what the twin made of the same words. Out: how far they are apart, and how far they may be.
-//! Frame and unit: words of the stage's bindings; a stage's own difference has its own unit.
+//! In: the results of a GPU and of the twin for the same words. Out: how much they differ, and how much they may
+//! differ. Frame and unit: words of the stage's bindings; a stage's own difference has its own unit.
 
-/// When a GPU and the twin have done the same.
+/// Criterion for equal results of a GPU and the twin.
 #[derive(Clone, Copy, Debug)]
 pub enum Same {
-    /// Every word is the same.
+    /// Every word must be equal.
     Words,
-    /// The same but for the order of lists: (binding, words an entry); their number stands in word 3 of the binding
-    /// before.
+    /// Every word must be equal, but lists may be in any order: (binding, words per entry). The number of entries is
+    /// word 3 of the binding before the list.
     Lists(&'static [(usize, usize)]),
-    /// A difference of its own, the largest allowed, and why.
+    /// The stage's own measure of difference, the largest value allowed, and the reason.
     Within(fn(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64, f64, &'static str),
 }
 
 impl Same {
-    /// How far two results are apart.
+    /// The difference of two results.
     pub fn difference(&self, gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
         match self {
             Same::Words => differing_words(gpu, twin),
@@ -31,7 +31,7 @@ impl Same {
         }
     }
 
-    /// Why results so far apart count as the same.
+    /// Reason why results within the limit count as equal.
     pub fn reason(&self) -> &'static str {
         match self {
             Same::Words => "whole numbers only: every word is the same",
@@ -49,8 +49,8 @@ pub fn differing_words(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
         .sum::<usize>() as f64
 }
 
-/// As `differing_words`, where some bindings are lists in any order: (binding, words an entry). The number of entries
-/// is word 3 of the binding before the list; which tile takes which place is up to the GPU's scheduler.
+/// Like `differing_words`, but some bindings are lists in any order: (binding, words per entry). The number of entries
+/// is word 3 of the binding before the list. The GPU's scheduler decides the index of each tile.
 pub fn differing_words_beside_order(gpu: &[Vec<u32>], twin: &[Vec<u32>], lists: &[(usize, usize)]) -> f64 {
     let sorted = |b: &[Vec<u32>]| {
         let mut b = b.to_vec();

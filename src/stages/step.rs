@@ -1,33 +1,33 @@
-//! In: nothing. Out: what is stated of a stage once and read by whoever records, walks or checks it.
-//! Frame and unit: words of the stage's bindings.
+//! In: nothing. Out: the types with which a stage is described once, for recording, for the run on the twins and for
+//! the tests. Frame and unit: words of the stage's bindings.
 
 use super::frame::Frame;
 use super::same::Same;
 use crate::gpu::Stage;
 
-/// A stage's arithmetic on the CPU: changes the bindings in place, the uniform block is the first.
+/// A stage's arithmetic on the CPU: changes the bindings in place; the first is the uniform block.
 pub type Twin = fn(bindings: &mut [Vec<u32>], overrides: &[(&'static str, f64)]);
 
-/// How many workgroups run.
+/// The number of workgroups.
 #[derive(Clone, Copy, Debug)]
 pub enum Groups {
-    /// As many (x, y, z) as the layout of the batch asks for.
+    /// A number (x, y, z) that follows from the layout of the batch.
     Of(fn(&Frame) -> [u32; 3]),
-    /// As many as the list's header of that name asks for when the step runs.
+    /// The number in the header of the list with that name, when the step runs.
     Listed(&'static str),
 }
 
-/// A stage with its place in the chain.
+/// A stage with its usual place in the chain.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     /// The shader with its bindings.
     pub stage: &'static Stage,
     /// The same arithmetic on the CPU.
     pub twin: Twin,
-    /// What is bound, by the names of [`super::chain::table`].
+    /// The buffers that are bound, by the names in [`super::chain::table`].
     pub binds: &'static [&'static str],
-    /// Workgroups, in its usual place.
+    /// Number of workgroups at its usual place.
     pub groups: Groups,
-    /// How far the GPU and the twin may be apart.
+    /// How much the GPU and the twin may differ.
     pub same: Same,
 }

@@ -1,5 +1,4 @@
-//! In: the scenes with a stripe. Out: the cases of the stage that finds straight lines.
-//! Frame and unit: words.
+//! In: the first three scenes. Out: the cases of the stage that finds straight lines. Frame and unit: words.
 
 use super::scenes::scenes;
 use super::walk::Walk;
@@ -7,7 +6,7 @@ use crate::stages::entry::Case;
 use crate::stages::listing;
 use crate::stages::stripe::hough::{HoughFrame, HoughParams};
 
-/// Skeletons of the stripe scenes.
+/// Cases with the skeletons of the first three scenes.
 pub fn cases() -> Vec<Case> {
     scenes()
         .iter()

@@ -1,5 +1,4 @@
-//! In: nothing. Out: the cases on which each stage and its twin are compared.
-//! Frame and unit: pixels, words.
+//! In: nothing. Out: the cases on which each stage is compared with its twin. Frame and unit: pixels, words.
 
 mod hough;
 mod peaks;

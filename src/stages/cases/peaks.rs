@@ -12,18 +12,18 @@ use crate::stages::stripe::point::Optics;
 use crate::stages::stripe::{choose, point};
 use crate::stages::{Case, Thinning, ThresholdParams, peak};
 
-/// What the stages are told of a stripe and its rig.
+/// Properties of a stripe and its rig that the stages are given.
 struct Told {
     width_px: f32,
     optics: Optics,
 }
 
-/// The cases of one of the stages after the skeleton, with every method: the scenes with a stripe. The others are noise
-/// and edges, on which a fit ends anywhere.
+/// The cases of one of the stages after the skeleton, with every method, on the scenes with a stripe. The other scenes
+/// have noise and edges, on which the result of a fit is arbitrary.
 pub fn peaks(stage: &str) -> Vec<Case> {
     let scenes = super::scenes();
     let striped = scenes.iter().filter(|s| s.name.contains("stripe"));
-    // Only points know of the lens.
+    // Only the stage `point` uses the lens.
     let rigs: &[fn(u32, u32) -> Optics] = if stage == point::STAGE.name { &[optics, tilted] } else { &[optics] };
     let told = |s: &Scene, rig: &fn(u32, u32) -> Optics| Told {
         width_px: 3.0,
@@ -32,18 +32,19 @@ pub fn peaks(stage: &str) -> Vec<Case> {
     striped.flat_map(|s| rigs.iter().flat_map(move |r| cases(s.name, s, &told(s, r), &Method::ALL, stage))).collect()
 }
 
-/// Profile sigmas, px: every number of quads and of rows a sample.
+/// Profile sigmas, px: together they have every number of quads, and of rows per sample.
 const WIDTHS: [f64; 8] = [0.8, 1.0, 1.5, 2.0, 2.5, 3.3, 5.0, 9.0];
-/// A few degrees off the image axes, so that the skeleton comes by every place within a word. The angle of the
-/// stripe, then that of a stripe on a level surface: a wall stands upright where the rig's stripe lies.
+/// A few degrees off the image axes, so that the skeleton passes every place within a word. Each entry has the stripe's
+/// angle, then the angle of a stripe on a level surface. In the last entry, a wall, they differ: the stripe is upright
+/// where the rig's stripe lies.
 const DIRECTIONS: [(&str, f64, f32); 4] =
     [("lying", 4.0, 0.0), ("upright", 86.0, 90.0), ("at 45 degrees", 45.0, 45.0), ("a wall", 86.0, 0.0)];
 const DEPTHS: [u8; 4] = [8, 10, 12, 16];
 
-/// How much of widths, directions, depths and methods is looked at.
+/// Which combinations of width, direction, depth and method are tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Space {
-    /// Every two of width, direction and depth meet once.
+    /// Any two values of width, direction and depth occur together in at least one case.
     Pairs,
     /// Every width with every direction, depth and method.
     Whole,
@@ -71,14 +72,15 @@ pub fn ruled(stage: &str, space: Space) -> Vec<Case> {
     all
 }
 
-/// A narrow field of view, so that the sheet is at a working distance all over the picture, and the direction of depth.
+/// A narrow field of view, so that the sheet is at a working distance everywhere in the picture; `level_deg` is the
+/// angle of the stripe on a level surface.
 fn rig(width: u32, level_deg: f32) -> Optics {
     let (sin, cos) = level_deg.to_radians().sin_cos();
     let [f, c] = [4.0 * width as f32, 0.5 * width as f32];
     Optics { pinhole: [f, f, c, c, 0.0], normal: [0.8828 * sin, 0.8828 * cos, 0.4694].into(), ..optics(width, width) }
 }
 
-/// A straight stripe through the middle of a picture that holds its background on both sides.
+/// A straight stripe through the middle of a picture that contains its background on both sides.
 fn straight(sigma: f64, angle_deg: f64, bits: u8) -> Scene {
     let (sin, cos) = angle_deg.to_radians().sin_cos();
     let full = f64::from((1u32 << bits) - 1);
@@ -109,7 +111,7 @@ fn cases(name: &str, scene: &Scene, told: &Told, methods: &[Method], wanted: &st
     let (f, bits) = (walk.frame, scene.shots[0].bits);
     let mut cases = Vec::new();
     for &method in methods {
-        // Wide stripes' speckle has grains.
+        // The speckle of wide stripes has grains.
         let grain = if told.width_px > 3.0 { 2.5 } else { 1.0 };
         let p = PeakParams { method, width_px: told.width_px, speckle: 0.05, grain, ..Default::default() };
         let choice = crate::stages::stripe::choose_params::ChooseParams { echo: 0.4, ..Default::default() };

@@ -1,5 +1,5 @@
-//! In: nothing. Out: the pictures that the stages are judged on, a rig and poses to go with them.
-//! Frame and unit: pixels, grey levels; mm.
+//! In: nothing. Out: the pictures on which the stages are tested, with a rig and poses. Frame and unit: pixels, grey
+//! levels; mm.
 
 use crate::camera::{Distortion, Intrinsics};
 use crate::geometry::{Plane, Vec3};
@@ -11,23 +11,23 @@ use crate::stages::{Thinning, ThresholdParams, Window, frame};
 /// Pictures of one batch with their settings.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// What the pictures show, for the cases' names.
+    /// Description of the pictures, for the cases' names.
     pub name: &'static str,
     /// The pictures, all of one size and depth.
     pub shots: Vec<Image>,
     /// Settings of the threshold: px, and grey levels of the pictures' depth.
     pub params: ThresholdParams,
-    /// Rule of the thinning.
+    /// The rule of thinning.
     pub thinning: Thinning,
-    /// Bits to set in [`frame::Frame::flags`] beside those of the settings.
+    /// Bits to set in [`frame::Frame::flags`] in addition to those of the settings.
     pub flags: u32,
-    /// [`frame::Frame::spacing`].
+    /// Value of [`frame::Frame::spacing`].
     pub spacing: u32,
-    /// Picture of the ambient light, of the same size and depth; `None` subtracts nothing.
+    /// Picture of the ambient light, of the same size and depth; with `None` nothing is subtracted.
     pub ambient: Option<Image>,
 }
 
-/// One curved Gaussian stripe of the given sigma on noise, with a few round reflections.
+/// One curved Gaussian stripe of the given sigma with noise and `blobs` round reflections.
 pub fn stripe(width: u32, height: u32, bits: u8, sigma: f64, blobs: u32, seed: u64) -> Image {
     let mut noise = Noise(seed);
     let full = f64::from((1u32 << bits) - 1);
@@ -55,14 +55,14 @@ pub fn stripe(width: u32, height: u32, bits: u8, sigma: f64, blobs: u32, seed: u
     image(width, height, bits, px)
 }
 
-/// Any picture from a function of the pixel.
+/// A picture from a function of the pixel.
 pub fn drawn(width: u32, height: u32, bits: u8, mut f: impl FnMut(u32, u32) -> u32) -> Image {
     let px = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| f(x, y) as u16).collect();
     image(width, height, bits, px)
 }
 
-/// Faint noise with one brighter pixel in every other tile of every other row of tiles, on the picture's border where
-/// the tile has one, some of them two, and each as bright as the threshold or one level beside it.
+/// Faint noise with one brighter pixel in every other tile of every other row of tiles, at the picture's border if the
+/// tile touches it; some tiles have two. Each pixel is as bright as the threshold or one level above or below it.
 fn specks(width: u32, height: u32, bits: u8) -> Image {
     let mut noise = Noise(31);
     let grey = |level: u32| level << (bits - 8);
@@ -85,7 +85,7 @@ fn image(width: u32, height: u32, bits: u8, px: Vec<u16>) -> Image {
     }
 }
 
-/// The pictures of the stage tests: real shapes, odd sizes, both depths, and adversarial ones.
+/// The pictures of the stage tests: real shapes, odd sizes, several depths, and adversarial pictures.
 pub fn scenes() -> Vec<Scene> {
     let base = Scene {
         name: "",
@@ -165,7 +165,7 @@ pub fn scenes() -> Vec<Scene> {
             ..base.clone()
         },
         Scene {
-            // 9 (25 - 4) is 9 * 20 + 5 + 4: one level brighter would pass.
+            // 9 (25 - 4) equals 9 * 20 + 5 + 4: with one level more the pixel would pass.
             name: "specks that just do not pass",
             shots: vec![drawn(96, 40, 8, |x, y| if x % 64 == 17 && y % 16 == 3 { 25 + y / 32 } else { 20 })],
             params: p(3, 4, 0),
@@ -187,7 +187,7 @@ pub fn scenes() -> Vec<Scene> {
     ]
 }
 
-/// A camera of 55 degrees with a common lens, a sheet that crosses its axis at 155 mm.
+/// A camera with a 55 degree field of view and a common lens, and a sheet that crosses its axis at 155 mm.
 pub fn optics(width: u32, height: u32) -> point::Optics {
     let f = 0.96 * width as f32;
     point::Optics {
@@ -199,7 +199,7 @@ pub fn optics(width: u32, height: u32) -> point::Optics {
     }
 }
 
-/// The same with all of a lens's terms on a sensor that is tilted by 11 and 7 degrees.
+/// The same with all lens terms and a sensor tilted by 11 and 7 degrees.
 pub(super) fn tilted(width: u32, height: u32) -> point::Optics {
     let k = Intrinsics {
         fx: 0.96 * f64::from(width),
@@ -214,7 +214,7 @@ pub(super) fn tilted(width: u32, height: u32) -> point::Optics {
     point::Optics::new(&k, &Plane::new(Vec3::new(-0.0192, 0.8828, 0.4694), 72.15).expect("a normal"))
 }
 
-/// A turned pose some way off the base, another one a shot.
+/// A rotated pose some distance from the base, different for each shot.
 pub fn pose(shot: u32) -> [f32; 12] {
     let (s, c) = (0.3 + 0.1 * shot as f32).sin_cos();
     [c, -s, 0.0, 420.0, s, c, 0.0, -60.0 + shot as f32, 0.0, 0.0, 1.0, 310.0]

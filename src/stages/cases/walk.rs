@@ -1,6 +1,5 @@
-//! In: a scene. Out: the chain on the twins, by the table that the GPU's recording reads; the cases of each of its
-//! stages.
-//! Frame and unit: words of the stages' bindings.
+//! In: a scene. Out: the result of the chain on the twins, with the table from which the GPU's recording is made; the
+//! cases of each of its stages. Frame and unit: words of the stages' bindings.
 
 use super::scenes::{Scene, scenes};
 use crate::raster::Image;
@@ -16,19 +15,19 @@ pub fn of(stage: &str) -> Vec<Case> {
     scenes().iter().flat_map(|s| Walk::new(s).run(stage)).collect()
 }
 
-/// The chain on the twins, buffer by buffer.
+/// A run of the chain on the twins, buffer by buffer.
 pub struct Walk<'a> {
     scene: &'a Scene,
     /// Layout and settings of the scene's batch.
     pub frame: Frame,
-    /// Words of every buffer, by the names of [`crate::stages::chain::table`].
+    /// Words of every buffer, by the names in [`crate::stages::chain::table`].
     pub buffers: BTreeMap<&'static str, Vec<u32>>,
     captured: Vec<Case>,
     wanted: &'a str,
 }
 
 impl<'a> Walk<'a> {
-    /// The scene's pictures and settings in their buffers; every other buffer is 0.
+    /// Packs the scene's pictures and settings into their buffers; every other buffer is 0.
     pub fn new(scene: &'a Scene) -> Walk<'a> {
         let first = &scene.shots[0];
         let mut f = Frame::new(first.width, first.height, first.bits, scene.shots.len() as u32, &scene.params)
@@ -56,7 +55,7 @@ impl<'a> Walk<'a> {
         Walk { scene, frame: f, buffers, captured: Vec::new(), wanted: "" }
     }
 
-    /// Where the words of a name lie.
+    /// The buffer and the range of words that a name means.
     fn words(&self, name: &'static str) -> (&'static str, std::ops::Range<usize>) {
         match HEADERS.iter().find(|h| h.0 == name) {
             Some((_, of, at)) => (of, *at as usize..(at + HEADER) as usize),
@@ -95,14 +94,14 @@ impl<'a> Walk<'a> {
         steps.iter().for_each(|s| self.step(s));
     }
 
-    /// Walks the chain; gives the cases of the stage of that name. An empty name runs the chain only.
+    /// Runs the chain and returns the cases of the stage of that name. With an empty name it only runs the chain.
     pub fn run(&mut self, wanted: &'a str) -> Vec<Case> {
         self.wanted = wanted;
         self.steps(&table::prepare(self.scene.ambient.is_some()));
         self.steps(&table::front(&self.frame));
         self.thin();
         self.steps(&table::back(&self.frame));
-        // What the next batch does to what this one left.
+        // The steps with which the next batch starts on the results of this one.
         let next: Vec<Placed> = table::front(&self.frame).into_iter().take(2).collect();
         let left = (self.buffers.clone(), self.frame);
         self.steps(&next);
@@ -124,7 +123,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// What goes before a further round is tried even where one was enough; nothing of it stays.
+    /// Tries the steps before a further round even if one round was enough; their results are discarded.
     fn restarted(&mut self) {
         let left = self.buffers.clone();
         self.steps(&table::restart());

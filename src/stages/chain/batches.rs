@@ -1,5 +1,5 @@
-//! In: pictures, a batch at a time. Out: the skeleton pixels of each, from the GPU, in order.
-//! Frame and unit: pixels. The pruned chain: statistics, tile list, threshold, thinning, list.
+//! In: pictures, a batch at a time. Out: the skeleton pixels of each, from the GPU, in order; peaks and points if they
+//! are measured. Frame and unit: pixels. The pruned chain: statistics, tile list, threshold, thinning, list.
 
 use super::config::ChainConfig;
 use super::measured::{Measuring, POSE_BYTES};
@@ -13,7 +13,7 @@ use crate::stages::peak::found::Peak;
 use crate::stages::stripe::point::Point;
 use crate::stages::stripe::skeleton;
 
-/// The chain on one GPU for one kind of picture. `T` is what its owner wants back with a batch.
+/// The chain on one GPU for one size and depth of pictures. `T` is returned to the caller with each batch.
 pub struct Chain<T = u64> {
     /// Layout and settings of a batch.
     pub frame: Frame,
@@ -21,41 +21,43 @@ pub struct Chain<T = u64> {
     ring: Ring<InFlight<T>>,
     replay: Replay,
     runs: Runs,
-    /// Sections that were needed so far; 0 before the first batch, which gets a whole round.
+    /// Sections of thinning that were needed so far; 0 before the first batch, which gets a whole round.
     needed: usize,
-    /// Further whole rounds that every batch gets; grows when stripes are wider than they reach.
+    /// Further whole rounds that every batch gets; grows if stripes are wider than these reach.
     rounds: usize,
     /// The header of the batch that was collected last.
     header: Vec<u32>,
     recorded: Recorded,
-    /// Where the poses begin in the input, if points are wanted.
+    /// Byte offset of the poses in the input, if points are measured.
     poses: Option<usize>,
-    /// Rows of a picture that are written at a time, and the input's bytes in such parts.
+    /// Rows of a picture that are written at a time, and the sizes in bytes of all such parts of the input.
     band: u32,
     parts: Vec<usize>,
 }
 
-/// A batch under way.
+/// A batch in flight.
 struct InFlight<T> {
     tag: T,
     shots: u32,
-    /// Sections of the first round of thinning that it was given.
+    /// Sections of the first round of thinning that were recorded for it.
     sections: usize,
 }
 
-/// The chain's work in pieces.
+/// The chain's work as separate recordings.
 struct Runs {
-    /// What is done once a batch, to its mask, and from the thinned mask on, per place of the ring.
+    /// Work that is done once per batch, work up to its mask, and work from the thinned mask on; one recording each per
+    /// slot.
     prepare: Vec<Recording>,
     front: Vec<Recording>,
     back: Vec<Recording>,
-    /// A round of thinning in sections, and what goes before a further round.
+    /// A round of thinning in sections, and the work before a further round.
     thinning: Vec<Recording>,
     restart: Recording,
 }
 
 impl Runs {
-    /// Records all of it; where points are wanted, with what measures them and where the poses begin.
+    /// Records all work. `measuring` has the stages that measure points, and the offset of the poses, if points are
+    /// measured.
     fn record<T>(
         device: &Device,
         frame: &Frame,
@@ -86,7 +88,7 @@ impl Runs {
         runs
     }
 
-    /// One batch: so many sections of thinning, then further whole rounds.
+    /// The work of one batch: this many sections of thinning, then further whole rounds.
     fn of(&self, at: usize, upload: bool, sections: usize, rounds: usize) -> Vec<&Recording> {
         let mut work = Vec::new();
         work.extend(upload.then_some(&self.prepare[at]));
@@ -101,22 +103,22 @@ impl Runs {
     }
 }
 
-/// What one batch came to.
+/// The result of one batch.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Batch<T = u64> {
-    /// What was given at submission.
+    /// The value given at submission.
     pub tag: T,
-    /// Skeleton pixels x | y << 16, and the shot within the batch; empty where peaks are measured.
+    /// Skeleton pixels x | y << 16, and the shot within the batch; empty if peaks are measured.
     pub pixels: Vec<[u32; 2]>,
-    /// One peak a skeleton pixel, and its point, where peaks are measured.
+    /// One peak for each skeleton pixel, if peaks are measured.
     pub peaks: Vec<Peak>,
-    /// The peaks' points, entry by entry, mm in the poses' frame; not a number where the peak was refused.
+    /// One point for each peak, mm in the poses' frame; NaN if the peak was rejected.
     pub points: Vec<Point>,
-    /// First skeleton pixel of every shot, and the end; its peak and point stand there too.
+    /// Index of the first skeleton pixel of every shot, and the end; its peak and point have the same index.
     pub starts: Vec<u32>,
-    /// Skeleton pixels found; more than `pixels` or `peaks` holds when the list was full.
+    /// Number of skeleton pixels found; more than `pixels` or `peaks` contains if the list was full.
     pub found: u32,
-    /// Tiles that were looked at closely.
+    /// Number of tiles that could not be proven dark.
     pub listed_tiles: u32,
 }
 
@@ -128,7 +130,7 @@ impl<T> Batch<T> {
 }
 
 impl<T> Chain<T> {
-    /// Compiles the stages and makes every buffer; `Err` on settings out of range or too large for the device.
+    /// Compiles the stages and makes every buffer. `Err` if settings are out of range or too large for the device.
     pub fn new(device: &Device, config: &ChainConfig) -> Result<Chain<T>> {
         if !(1..=64).contains(&config.shots) || !(1..=8).contains(&config.slots) {
             return Err(Fault::usage(format!(
@@ -147,7 +149,7 @@ impl<T> Chain<T> {
             Some(m) => Some(Measuring::new(device, &frame, config.bits, m)?),
             None => None,
         };
-        // The poses lie behind the pictures, where every adapter can bind.
+        // The poses follow the pictures, at an offset at which every adapter can bind.
         let poses = (frame.image_bytes() as u64 * u64::from(frame.shots)).next_multiple_of(256);
         let input = poses + measuring.as_ref().map_or(0, |_| POSE_BYTES * u64::from(frame.shots));
         let ring = Ring::new(
@@ -180,30 +182,30 @@ impl<T> Chain<T> {
         })
     }
 
-    /// The GPU that it runs on.
+    /// The GPU that the chain runs on.
     pub fn device(&self) -> &Device {
         &self.device
     }
-    /// A batch can be submitted without waiting for one to finish.
+    /// Whether a batch can be submitted without waiting for one to finish.
     pub fn has_room(&self) -> bool {
         self.ring.has_room()
     }
-    /// Batches that were submitted and not yet collected.
+    /// Number of batches that were submitted and not yet collected.
     pub fn in_flight(&self) -> usize {
         self.ring.in_flight()
     }
-    /// Starts a batch of 1 to `shots` pictures. Call `collect` first when there is no room.
+    /// Starts a batch of 1 to `shots` pictures. Panics if there is no room: call `collect` first.
     pub fn submit(&mut self, tag: T, images: &[&Image]) -> Result<()> {
         self.submit_posed(tag, images, &[])
     }
 
-    /// As `submit`, with the shots' poses ([`crate::stages::stripe::point::pose_words`]), which a chain that measures
+    /// Like `submit`, with the shots' poses ([`crate::stages::stripe::point::pose_words`]), which a chain that measures
     /// needs.
     pub fn submit_posed(&mut self, tag: T, images: &[&Image], poses: &[[f32; 12]]) -> Result<()> {
         assert!(self.poses.is_none() || poses.len() == images.len(), "one pose a picture");
         assert!((1..=self.frame.shots as usize).contains(&images.len()), "1 to {} pictures a batch", self.frame.shots);
         let (frame, band, parts) = (self.frame, self.band, &self.parts);
-        // From the last picture's end to the poses.
+        // Bytes between the last picture's end and the poses.
         let gap = self.poses.map(|at| at - frame.image_bytes() * frame.shots as usize);
         let bands = frame.height.div_ceil(band) as usize;
         let fill = |i: usize, put: &mut dyn FnMut(usize, &[u8])| {
@@ -215,7 +217,7 @@ impl<T> Chain<T> {
                     }
                 }
                 Some(image) => frame.put_rows(image, top..(top + band).min(frame.height), put)?,
-                // What an unfilled place held before must not be found again.
+                // A picture left from an earlier batch must not be evaluated again.
                 None => {
                     let dark = [0u8; 4096];
                     for from in (0..parts[i]).step_by(dark.len()) {
@@ -231,15 +233,16 @@ impl<T> Chain<T> {
         self.run(at, true, sections)
     }
 
-    /// As `submit_posed` with the pictures and poses that lie in the next place since it was last filled: work
-    /// without an upload, to measure what the device does by itself. The ambient light is not subtracted a second time.
+    /// Like `submit_posed`, with the pictures and poses that the next slot was last filled with: work without an
+    /// upload, to measure the device alone. The ambient light is not subtracted a second time.
     pub fn submit_again(&mut self, tag: T, shots: u32) -> Result<()> {
         let sections = self.sections();
         let at = self.ring.keep(InFlight { tag, shots, sections })?;
         self.run(at, false, sections)
     }
 
-    /// The oldest batch if it is done; waits for it if asked. `None` when nothing is under way, or not done.
+    /// The oldest batch if it is done; waits for it if `wait` is set. `None` if no batch is in flight, or it is not
+    /// done.
     pub fn collect(&mut self, wait: bool) -> Result<Option<Batch<T>>>
     where
         T: Default,
@@ -248,7 +251,8 @@ impl<T> Chain<T> {
         Ok(self.collect_into(wait, &mut batch)?.then_some(batch))
     }
 
-    /// As `collect`, into a batch whose memory is used again: the steady state asks for none. False when there is none.
+    /// Like `collect`, into a batch whose memory is reused: in the steady state nothing is allocated. False if there is
+    /// no batch.
     pub fn collect_into(&mut self, wait: bool, batch: &mut Batch<T>) -> Result<bool> {
         let shots = loop {
             let Some((at, flight)) = self.ring.oldest(wait, &mut self.header)? else { return Ok(false) };
@@ -257,8 +261,8 @@ impl<T> Chain<T> {
                 self.needed = self.needed.max(left + 1);
                 break flight.shots as usize;
             }
-            // Some stripe takes more sub-iterations than were done. Another batch may have used the masks since:
-            // this one starts over with more of them, and so do all that follow.
+            // Some stripe needs more sub-iterations than were done. Another batch may have used the masks since then,
+            // so this batch starts over with more of them. All later batches also get more.
             self.needed = self.runs.thinning.len();
             flight.sections = self.needed;
             if given == self.runs.thinning.len() {
@@ -288,7 +292,7 @@ impl<T> Chain<T> {
     }
 
     /// Sections of the first round for the next batch: as many as any batch needed so far. Empty dispatches cost 10 us
-    /// each on a software adapter, and one batch that starts over costs less than those of all others.
+    /// each on a software adapter. It costs less to start one batch over than to give all others more sections.
     fn sections(&self) -> usize {
         match (self.needed, self.rounds) {
             (0, _) | (_, 1..) => self.runs.thinning.len(),
@@ -301,25 +305,25 @@ impl<T> Chain<T> {
         self.ring.run(at, &mut self.replay, &work, upload)
     }
 
-    /// The thinned mask of a shot of the batch that ran last; for tests and pictures, not for the shot path.
+    /// The thinned mask of a shot of the batch that ran last; for tests and pictures, not for scanning.
     pub fn mask(&self, shot: u32) -> Result<Mask> {
         let words: Vec<u32> = bytemuck::pod_collect_to_vec(&self.device.read(self.recorded.buffer("mask"))?);
         Ok(self.frame.unpack_mask(&words, shot))
     }
-    /// As `mask`, before thinning.
+    /// Like `mask`, before thinning.
     pub fn lit(&self, shot: u32) -> Result<Mask> {
         let words: Vec<u32> = bytemuck::pod_collect_to_vec(&self.device.read(self.recorded.buffer("lit"))?);
         Ok(self.frame.unpack_mask(&words, shot))
     }
 
-    /// GPU time of every step of the last submitted batch; empty unless `timed` and the adapter can.
+    /// GPU time of every step of the last submitted batch; empty unless `timed` is set and the adapter has timestamps.
     pub fn times(&self) -> Result<Vec<StageTime>> {
         self.replay.times()
     }
 }
 
-/// Rows of a picture that are written at a time, and the bytes of all such parts of the input; the last one holds the
-/// poses.
+/// Rows of a picture that are written at a time, and the sizes in bytes of all such parts of the input. The last part
+/// contains the poses.
 fn parts(f: &Frame, input: u64) -> (u32, Vec<usize>) {
     let row = 4 * f.pitch as usize;
     let band = (PART / row).clamp(1, f.height as usize);

@@ -1,48 +1,46 @@
-//! In: nothing. Out: what a chain is built for.
-//! Frame and unit: px; each field says.
+//! In: nothing. Out: the settings that a chain is built for. Frame and unit: px; stated at each field.
 
 use super::measure::Measure;
 use crate::gpu::Device;
 use crate::raster::{Image, Mask};
 use crate::stages::{Thinning, ThresholdParams};
 
-/// What a chain is built for.
+/// Settings of a chain.
 #[derive(Clone, Debug)]
 pub struct ChainConfig {
-    /// Picture size, px.
+    /// Picture width, px.
     pub width: u32,
-    /// Picture size, px.
+    /// Picture height, px.
     pub height: u32,
     /// Depth of the pictures, 8..=16.
     pub bits: u8,
-    /// Pictures in one batch, 1..=64; small pictures want many, a dispatch costs as much as 100,000 pixels.
+    /// Pictures in one batch, 1..=64. Small pictures need many, because a dispatch costs as much as 100,000 pixels.
     pub shots: u32,
     /// Batches in flight, 1..=8.
     pub slots: usize,
-    /// Which pixels are lit: px, and grey levels of the pictures' depth.
+    /// Limits of lit pixels: px, and grey levels of the pictures' depth.
     pub threshold: ThresholdParams,
-    /// Which boundary pixels thinning deletes.
+    /// The rule by which thinning deletes boundary pixels.
     pub thinning: Thinning,
-    /// Prove tiles dark before looking at them. Off is the plain path: the same result, slower.
+    /// Whether tiles are proven dark first, and then skipped. Off is the plain path: the same result, but slower.
     pub prune: bool,
-    /// Pixels that are looked at; `None` for all.
+    /// Pixels that are evaluated; `None` for all.
     pub region: Option<Mask>,
-    /// Subtracted from every picture.
+    /// Picture of the ambient light, which is subtracted from every picture.
     pub ambient: Option<Image>,
-    /// How far the ends of lines are carried on ([`crate::stages::stripe::lengthen::LengthenParams::word`]); 0 is not
-    /// at all.
+    /// How far the ends of lines are lengthened ([`crate::stages::stripe::lengthen::LengthenParams::word`]); 0 is off.
     pub lengthen: u32,
-    /// One fit a crossing of a wide stripe ([`crate::stages::stripe::spacing::word`]), none of what has no company
-    /// ([`crate::stages::stripe::spacing::COMPANY`]); 0 is one for every skeleton pixel.
+    /// One fit for each column of a wide stripe ([`crate::stages::stripe::spacing::word`]), and none for isolated lit
+    /// pixels ([`crate::stages::stripe::spacing::COMPANY`]). 0 fits every skeleton pixel.
     pub spacing: u32,
-    /// Peaks, their choice and points for every skeleton pixel; `None` ends with the pixels.
+    /// Settings of peaks, their choice and points for every skeleton pixel. `None`: the chain ends with the pixels.
     pub measure: Option<Measure>,
-    /// Take GPU timestamps of every stage.
+    /// Whether GPU timestamps of every stage are taken.
     pub timed: bool,
 }
 
 impl ChainConfig {
-    /// Defaults for pictures of `width` x `height` px and 8..=16 bits: 10 million px or 32 shots a batch, no peaks.
+    /// Defaults for pictures of `width` x `height` px and 8..=16 bits: batches of 10 million px or 32 shots, no peaks.
     pub fn new(width: u32, height: u32, bits: u8) -> ChainConfig {
         ChainConfig {
             width,
@@ -61,9 +59,9 @@ impl ChainConfig {
             timed: false,
         }
     }
-    /// With the batch that hides the fixed cost on this device: one with memory of its own has more processors to
-    /// keep busy, and a dispatch of any size takes it as long as 400,000 pixels. All three batches need less than a
-    /// gigabyte.
+    /// The same with a batch that is large enough to hide the fixed cost on this device. A device with its own memory
+    /// has more processors to keep busy, and any dispatch takes it as long as 400,000 pixels. The three batches in
+    /// flight need less than a gigabyte.
     pub fn on(self, device: &Device) -> ChainConfig {
         if !device.info.unified_memory {
             return ChainConfig { shots: shots_for(self.width, self.height, 40_000_000, 64), ..self };
@@ -72,7 +70,7 @@ impl ChainConfig {
     }
 }
 
-/// Shots of a batch of about so many pixels.
+/// Number of shots in a batch of about `pixels` pixels, 1..=`most`.
 pub fn shots_for(width: u32, height: u32, pixels: u32, most: u32) -> u32 {
     (pixels / width.saturating_mul(height).max(1)).clamp(1, most)
 }

@@ -1,17 +1,17 @@
-//! In: nothing. Out: what is measured at the skeleton's pixels, and with which rig.
-//! Frame and unit: px, grey levels; each part says.
+//! In: nothing. Out: settings of the measurement at the skeleton pixels, and the rig. Frame and unit: px, grey levels;
+//! stated at each part.
 
 use crate::stages::peak::params::PeakParams;
 use crate::stages::stripe::choose_params::ChooseParams;
 use crate::stages::stripe::point::Optics;
 
-/// What the chain does with the skeleton's pixels.
+/// What the chain computes at the skeleton pixels.
 #[derive(Clone, Debug)]
 pub struct Measure {
-    /// How the sub-pixel peak is found.
+    /// Settings of the sub-pixel peaks.
     pub peak: PeakParams,
-    /// Which peaks are believed.
+    /// Tests that peaks must pass.
     pub choose: ChooseParams,
-    /// Camera and laser plane, camera frame.
+    /// Camera and laser plane, in the camera frame.
     pub optics: Optics,
 }

@@ -1,5 +1,6 @@
-//! In: the point list of a batch, the settings of peaks and their choice, the rig, the shots' poses. Out: dispatches
-//! that turn it into chosen peaks and points. Frame and unit: pixels and grey levels; points in the poses' frame, mm.
+//! In: the pixel list of a batch, the settings of peaks and of their choice, the rig, the shots' poses. Out: dispatches
+//! that compute chosen peaks and points from it. Frame and unit: pixels and grey levels; points in the poses' frame,
+//! mm.
 
 use super::measure::Measure;
 use super::part::{Part, whole};
@@ -22,7 +23,7 @@ pub struct Measuring {
     frame: PeakFrame,
     uniform: Buffer,
     rig: Buffer,
-    /// The skeleton's pixels.
+    /// The skeleton pixels.
     pub pixels: Buffer,
     strongest: Buffer,
     peak: Pipeline,
@@ -31,7 +32,7 @@ pub struct Measuring {
 }
 
 impl Measuring {
-    /// Compiles the stages and makes their buffers for batches as `f` lays them out, of pictures of `bits`, 8..=16.
+    /// Compiles the stages and makes their buffers for batches with the layout `f`, of pictures of `bits`, 8..=16.
     pub fn new(device: &Device, f: &Frame, bits: u8, m: &Measure) -> Result<Measuring> {
         let frame = PeakFrame::new((f.width, f.height, bits), f.shots, &m.peak, &m.choose, m.optics.across());
         let uniform = device.storage("peak frame", size_of::<PeakFrame>() as u64)?;
@@ -52,13 +53,13 @@ impl Measuring {
         })
     }
 
-    /// Bytes of the two outputs, peaks and points, of a batch.
+    /// Sizes in bytes of the two outputs of a batch, peaks and points.
     pub fn output_bytes(f: &Frame) -> Vec<u64> {
         let n = u64::from(f.capacity);
         vec![n * size_of::<Peak>() as u64, n * size_of::<Point>() as u64]
     }
 
-    /// Dispatches from the pixel list to the points; their number is read from `header`.
+    /// Dispatches from the pixel list to the points; the number of workgroups is read from `header`.
     pub fn record(
         &self,
         device: &Device,

@@ -1,5 +1,4 @@
-//! In: a buffer. Out: a part of it as stages bind it.
-//! Frame and unit: bytes.
+//! In: a buffer. Out: a part of it that stages can bind: (buffer, byte offset, bytes). Frame and unit: bytes.
 
 use crate::gpu::Buffer;
 

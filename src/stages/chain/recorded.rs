@@ -1,5 +1,5 @@
-//! In: the chain's table, the layout of a batch. Out: its steps as recordings on a GPU, and the buffers they share.
-//! Frame and unit: bytes, words.
+//! In: the chain's table, the layout of a batch. Out: its steps as recordings on a GPU, and the buffers that they
+//! share. Frame and unit: bytes, words.
 
 use super::config::ChainConfig;
 use super::part::{Part, whole};
@@ -11,7 +11,7 @@ use crate::stages::step::Groups;
 use crate::stages::stripe::threshold::gaussian_weights;
 use std::collections::BTreeMap;
 
-/// Bytes from one uniform block to the next; every adapter can bind there.
+/// Bytes from one uniform block to the next; every adapter can bind at multiples of this.
 const STEP_BYTES: u64 = 256;
 
 /// The chain's stages, compiled, and the buffers that all batches use one after the other.
@@ -22,7 +22,7 @@ pub struct Recorded {
     has_ambient: bool,
 }
 
-/// Buffers of one place of the ring, by the table's names.
+/// Buffers of one slot of the ring, by the table's names.
 pub type Own<'a> = [(&'static str, &'a Buffer)];
 
 impl Recorded {
@@ -55,7 +55,7 @@ impl Recorded {
         Ok(recorded)
     }
 
-    /// What stays from batch to batch: region, weights, ambient light.
+    /// Writes the data that stays the same for all batches: region, weights, ambient light.
     fn fill(&self, device: &Device, f: &Frame, config: &ChainConfig) -> Result<()> {
         if let Some(region) = &config.region {
             device.write(self.buffer("roi"), 0, bytemuck::cast_slice(&f.pack_mask(region)));
@@ -74,7 +74,7 @@ impl Recorded {
         self.buffers.get(name).unwrap_or_else(|| panic!("the chain has no buffer '{name}'"))
     }
 
-    /// What a name stands for in a sub-iteration.
+    /// The part of a buffer that a name means in a sub-iteration.
     fn part<'a>(&'a self, name: &str, iteration: u32, own: &Own<'a>) -> Part<'a> {
         if name == FRAME {
             return (&self.uniforms, STEP_BYTES * u64::from(iteration), size_of::<Frame>() as u64);
@@ -102,11 +102,11 @@ impl Recorded {
         r
     }
 
-    /// What is done to the pictures where they lie, once.
+    /// Work on the pictures in place, once per batch.
     pub fn prepare(&self, device: &Device, f: &Frame, own: &Own) -> Recording {
         self.record(device, f, &table::prepare(self.has_ambient), own)
     }
-    /// From the pictures to the mask.
+    /// Work from the pictures to the mask.
     pub fn front(&self, device: &Device, f: &Frame, own: &Own) -> Recording {
         self.record(device, f, &table::front(f), own)
     }
@@ -114,11 +114,11 @@ impl Recorded {
     pub fn thinning(&self, device: &Device, f: &Frame) -> Vec<Recording> {
         table::thinning().iter().map(|section| self.record(device, f, section, &[])).collect()
     }
-    /// Between two rounds of thinning.
+    /// Work between two rounds of thinning.
     pub fn restart(&self, device: &Device, f: &Frame) -> Recording {
         self.record(device, f, &table::restart(), &[])
     }
-    /// From the thinned mask to the list of points.
+    /// Work from the thinned mask to the pixel list.
     pub fn back(&self, device: &Device, f: &Frame, own: &Own) -> Recording {
         self.record(device, f, &table::back(f), own)
     }

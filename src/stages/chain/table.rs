@@ -1,6 +1,6 @@
-//! In: the layout of a batch. Out: the chain as one table: its buffers, and its steps in order. Recording, the walk
-//! on the twins and the tests read it; nothing else knows the order. Reasons: docs/math.md, Stripe stages.
-//! Frame and unit: words of 32 bits.
+//! In: the layout of a batch. Out: the chain as one table: its buffers, and its steps in order. The recording, the run
+//! on the twins and the tests read it; the order is stated nowhere else. Reasons: docs/math.md, Stripe stages. Frame
+//! and unit: words of 32 bits.
 
 use crate::stages::Thinning;
 use crate::stages::frame::{Frame, GAUSSIAN, HAS_ROI, PX_LOG2, px_log2};
@@ -8,17 +8,17 @@ use crate::stages::listing::{self, HEADER_WORDS};
 use crate::stages::step::{Groups, Step};
 use crate::stages::stripe::{ambient, lengthen, skeleton, spacing, specks, stats, thin, threshold, tiles};
 
-/// The uniform block, another one each sub-iteration of thinning.
+/// The uniform block, a different one for each sub-iteration of thinning.
 pub const FRAME: &str = "frame";
 
-/// Sub-iterations in one round of thinning; a stripe 50 px wide takes 52. Wider ones go further rounds.
+/// Sub-iterations in one round of thinning; a stripe 50 px wide needs 52. Wider stripes need further rounds.
 pub const ROUND: u32 = 56;
-/// Sub-iterations before which the tile list is shortened: the ends of the sections of a round. The first time soon:
-/// most tiles of a noisy picture hold specks that never change. Then at most 8 apart: what a change can travel in
-/// them stays within the neighbouring tiles, which are 8 px high.
+/// Sub-iterations before which the tile list is shortened: the ends of the sections of a round. The first is early,
+/// because most tiles of a noisy picture contain specks that never change. The others are at most 8 apart: within 8
+/// sub-iterations a change can reach only the neighbouring tiles, which are 8 px high.
 const SHORTEN: [u32; 8] = [2, 8, 16, 24, 32, 40, 48, ROUND];
 
-/// Buffers that all batches use one after the other, and their words.
+/// Buffers that all batches use one after the other, and their sizes in words.
 pub const BUFFERS: &[(&str, fn(&Frame) -> u32)] = &[
     ("ambient", |f| f.shot_words),
     ("stats", |f| 4 * f.tiles()),
@@ -47,10 +47,10 @@ pub const BUFFERS: &[(&str, fn(&Frame) -> u32)] = &[
     ("totals", |f| f.shots),
 ];
 
-/// Headers of lists, by name: the buffer and the first of their four words.
+/// Headers of lists: name, buffer, and index of the first of their four words.
 pub const HEADERS: &[(&str, &str, u32)] = &[
     ("single header", "single headers", 0),
-    // The count of all tiles that are listed.
+    // Only its count is used: the number of all listed tiles.
     ("all header", "single headers", HEADER_WORDS),
     ("run header", "run headers", 0),
     ("lit header", "lit headers", 0),
@@ -63,10 +63,10 @@ pub const HEADERS: &[(&str, &str, u32)] = &[
     (SHORTENED[7], "active headers", 6 * HEADER_WORDS),
     (SHORTENED[8], "active headers", 7 * HEADER_WORDS),
 ];
-/// Words of a header.
+/// Number of words in a header.
 pub const HEADER: u32 = 4;
 
-/// The header of the list after so many shortenings.
+/// Names of the list headers by the number of shortenings before; entry 0 is the full list.
 const SHORTENED: [&str; 9] = [
     "lit header",
     "header after 1",
@@ -79,16 +79,16 @@ const SHORTENED: [&str; 9] = [
     "header after 8",
 ];
 
-/// A step, what it binds in this place, and the sub-iteration that its uniform block holds.
+/// A step in its place in the chain: what it binds there, and the sub-iteration in its uniform block.
 #[derive(Clone, Debug)]
 pub struct Placed {
-    /// What is stated of the step once; `binds` and `groups` here go before its own.
+    /// The step's constant description; `binds` and `groups` of this place replace those in it.
     pub step: Step,
     /// Buffers by name, in the order of the stage's bindings.
     pub binds: Vec<&'static str>,
-    /// Workgroups in this place.
+    /// Workgroups at this place.
     pub groups: Groups,
-    /// [`Frame::step`] in this place: a sub-iteration of thinning, counted from 0.
+    /// [`Frame::step`] at this place: a sub-iteration of thinning, counted from 0.
     pub iteration: u32,
 }
 
@@ -98,13 +98,13 @@ impl From<Step> for Placed {
     }
 }
 
-/// A step with what the layout of a batch must have for it to run.
+/// Condition on the layout of a batch under which a step runs.
 type When = fn(&Frame) -> bool;
 
-/// What is done to the pictures where they lie, once: a batch that starts over must not do it again.
+/// Steps on the pictures in place, once per batch: a batch that starts over must not repeat them.
 const PREPARE: &[Step] = &[ambient::STEP];
 
-/// From the pictures to the mask, in order. A new stage is one line here or in [`BACK`].
+/// Steps from the pictures to the mask, in order. A new stage is one line here or in [`BACK`].
 const FRONT: &[(When, Step)] = &[
     (always, listing::CLEARING),
     (always, listing::RESETTING),
@@ -116,10 +116,10 @@ const FRONT: &[(When, Step)] = &[
     (by_gaussian, threshold::GATHERING),
 ];
 
-/// What thinning and its restarts repeat.
+/// Steps that thinning and its restarts repeat.
 const THINNING: &[Step] = &[thin::STEP, listing::COMPACTING, listing::REBASING];
 
-/// From the thinned mask to the list of points, in order.
+/// Steps from the thinned mask to the pixel list, in order.
 const BACK: &[(When, Step)] = &[
     (lengthened, lengthen::COPYING),
     (lengthened, lengthen::STEP),
@@ -157,12 +157,12 @@ fn running(part: &[(When, Step)], f: &Frame) -> Vec<Placed> {
     part.iter().filter(|(when, _)| when(f)).map(|(_, s)| (*s).into()).collect()
 }
 
-/// What is done to the pictures where they lie.
+/// Steps on the pictures in place.
 pub fn prepare(has_ambient: bool) -> Vec<Placed> {
     PREPARE.iter().filter(|_| has_ambient).map(|s| (*s).into()).collect()
 }
 
-/// From the pictures to the mask.
+/// Steps from the pictures to the mask.
 pub fn front(f: &Frame) -> Vec<Placed> {
     running(FRONT, f)
 }
@@ -184,19 +184,19 @@ pub fn thinning() -> Vec<Vec<Placed>> {
     begins.zip(SHORTEN).enumerate().map(section).collect()
 }
 
-/// Between two rounds of thinning.
+/// Steps between two rounds of thinning.
 pub fn restart() -> Vec<Placed> {
     vec![
         Placed { iteration: ROUND, ..listing::REBASING.into() },
-        // Later than the first sub-iteration, it leaves the lists that the front made.
+        // With an iteration above 0 it keeps the lists that the front made.
         Placed { iteration: 1, ..listing::RESETTING.into() },
     ]
 }
 
-/// From the thinned mask to the list of points.
+/// Steps from the thinned mask to the pixel list.
 pub fn back(f: &Frame) -> Vec<Placed> {
     let mut steps = running(BACK, f);
-    // The same stages read the thinned mask, or the one whose lines were carried on, or what was chosen of it.
+    // The same stages read the thinned mask, the mask with lengthened lines, or the pixels chosen from it.
     let long = if lengthened(f) { "long" } else { "mask" };
     let last = if spaced(f) { "spaced" } else { long };
     for s in &mut steps {
@@ -210,7 +210,7 @@ pub fn back(f: &Frame) -> Vec<Placed> {
     steps
 }
 
-/// The constants that a stage is built with.
+/// The override constants of a stage.
 pub fn overrides(step: &Step, f: &Frame, bits: u8, thinning: Thinning) -> Vec<(&'static str, f64)> {
     let all = [
         (PX_LOG2, f64::from(px_log2(bits))),

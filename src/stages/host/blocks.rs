@@ -1,6 +1,6 @@
-//! In: a band of a picture. Out: which blocks of 8 x 8 pixels may hold a lit pixel, and the least sum that a window
-//! around any of their pixels can come to; all others are proven dark.
-//! Frame and unit: blocks of pixels, four of them a tile; 256ths of full scale. docs/math.md, Stripe stages.
+//! In: a band of a picture. Out: the blocks of 8 x 8 pixels that may contain a lit pixel, and the least sum of a window
+//! around any of their pixels; all other blocks are proven dark. Frame and unit: blocks of pixels, four to a tile;
+//! 256ths of full scale. docs/math.md, Stripe stages.
 
 use super::sample::{EDGE, FOUR, Four, Sample};
 use crate::stages::Frame;
@@ -8,7 +8,7 @@ use crate::stages::frame::{ALL_TILES, GAUSSIAN};
 use crate::stages::stripe::stats::depth_shift;
 use multiversion::multiversion;
 
-/// Statistics of a row of blocks, one array each: what the proof needs of every block.
+/// Statistics of a row of blocks that the proof needs, one array for each quantity.
 #[derive(Clone, Default)]
 struct Row {
     sum: Vec<u16>,
@@ -19,7 +19,7 @@ struct Row {
     column: Vec<u16>,
 }
 
-/// Rows of blocks of a band of a picture, with `margin` rows and columns around them; beyond the picture its border
+/// Rows of blocks of a band of a picture, with `margin` rows and columns around them. Beyond the picture its border
 /// repeats.
 #[derive(Clone, Default)]
 pub struct Blocks {
@@ -27,12 +27,12 @@ pub struct Blocks {
     margin: usize,
     /// Number of the band's first row in the picture.
     first: usize,
-    /// Rows that are there, from the top of the margin.
+    /// Number of rows that are computed, from the top of the margin.
     done: usize,
 }
 
-/// How the windows of all pixels of a block lie over the blocks, along one axis: blocks up to `full` away are covered
-/// whole, `rest` pixels more lie in the blocks beyond them up to `reach` away.
+/// How the windows of all pixels of a block cover blocks, along one axis. Blocks up to `full` away are covered whole.
+/// `rest` more pixels lie in the blocks beyond them, up to `reach` away.
 #[derive(Clone, Copy)]
 struct Cover {
     full: isize,
@@ -55,18 +55,18 @@ impl Cover {
     }
 }
 
-/// What a row of blocks may hold: `lit` is not 0 where a pixel may pass, against a window of at least `least`.
+/// Result for a row of blocks: `lit` is not 0 if a pixel of the block may pass against a window with a sum of `least`.
 #[derive(Clone, Default)]
 pub struct Proof {
     pub lit: Vec<u8>,
     pub least: Vec<u32>,
-    /// Of columns of blocks: least sums of their part of a window, over a block's width and over one column of pixels.
+    /// For columns of blocks: least sums of their part of a window, over a block's width and over one column of pixels.
     bands: [Vec<u32>; 2],
     part: Vec<u16>,
 }
 
 impl Blocks {
-    /// Room for bands of so many rows.
+    /// Memory for bands of `rows` rows.
     pub fn new(f: &Frame, rows: usize) -> Blocks {
         let margin = Cover::new(f.size).reach as usize;
         let of = || vec![0; FOUR * f.tiles_x as usize + 2 * margin];
@@ -74,12 +74,13 @@ impl Blocks {
         Blocks { rows: (0..rows + 2 * margin).map(|_| row()).collect(), margin, first: 0, done: 0 }
     }
 
-    /// A band that begins with this row.
+    /// Begins a band with row `first`.
     pub fn begin(&mut self, first: usize) {
         (self.first, self.done) = (first, 0);
     }
 
-    /// Takes the statistics of the picture down to all that row `y` needs: what is proven next is then still at hand.
+    /// Computes the statistics down to the last row that row `y` needs, and no further, so that they are still in the
+    /// cache when they are used.
     fn gather<T: Sample>(&mut self, px: &[T], f: &Frame, y: usize) {
         let last = f.tiles_y as isize - 1;
         while self.done <= y - self.first + 2 * self.margin {
@@ -94,13 +95,13 @@ impl Blocks {
         }
     }
 
-    /// What row `y` of blocks may hold; the rows of a band in their order.
+    /// Proves row `y` of blocks; the rows of a band must come in order.
     pub fn prove<T: Sample>(&mut self, px: &[T], f: &Frame, y: usize, out: &mut Proof) {
         let across = FOUR * f.tiles_x as usize;
         out.lit.resize(across, 0);
         out.least.resize(across, 0);
         if f.flags & ALL_TILES != 0 {
-            // The plain path rests on no bound.
+            // The plain path uses no bound.
             out.lit.fill(1);
             return;
         }
@@ -112,10 +113,10 @@ impl Blocks {
 }
 
 impl Row {
-    /// Takes four blocks in, levels of 8 bits.
+    /// Stores the statistics of four blocks, as 8-bit levels.
     #[inline(always)]
     fn put(&mut self, at: usize, four: &Four, deep: u32) {
-        // The largest is rounded to the safe side.
+        // The largest is rounded up, to the safe side.
         let up = (1 << deep) - 1;
         let columns: [(&mut Vec<u16>, &[u32; FOUR], u32); 5] = [
             (&mut self.sum, &four.sum, 0),
@@ -131,7 +132,8 @@ impl Row {
             }
         }
     }
-    /// Beside the picture each row repeats its last pixel: a block there is eight times a column of the border's.
+    /// Beyond the left and right borders each row repeats its last pixel: the sum of a block there is eight times its
+    /// border column, of which the smallest column is a lower bound.
     fn repeat_sides(&mut self, margin: usize) {
         let last = self.sum.len() - margin - 1;
         for (from, to) in [(margin, 0..margin), (last, last + 1..last + 1 + margin)] {
@@ -142,14 +144,14 @@ impl Row {
             self.smallest[to].fill(smallest);
         }
     }
-    /// Above and below it each column does.
+    /// Above and below the picture each column repeats its last pixel.
     fn beyond(&self) -> Row {
         let eight = |v: &[u16]| v.iter().map(|v| 8 * v).collect();
         Row { sum: eight(&self.row), column: eight(&self.smallest), ..self.clone() }
     }
 }
 
-/// One row of blocks; pixels beyond the border repeat the border's.
+/// Statistics of one row of blocks; beyond the border the border's pixels repeat.
 #[multiversion(targets = "simd")]
 fn statistics<T: Sample>(px: &[T], f: &Frame, y: usize, margin: usize, out: &mut Row) {
     let (w, deep) = (f.width as usize, depth_shift(f));
@@ -168,8 +170,8 @@ fn statistics<T: Sample>(px: &[T], f: &Frame, y: usize, margin: usize, out: &mut
     }
 }
 
-/// Lower bounds on the sums of the windows around a row's pixels: windows hold the blocks near them whole, and of those
-/// further away a part.
+/// Lower bounds on the sums of the windows around a row's pixels. Windows contain the blocks near them whole, and a
+/// part of those farther away.
 #[multiversion(targets = "simd")]
 fn bound(blocks: &Blocks, f: &Frame, y: usize, out: &mut Proof) {
     let cover = Cover::new(f.size);
@@ -183,7 +185,7 @@ fn bound(blocks: &Blocks, f: &Frame, y: usize, out: &mut Proof) {
         }
     };
     if f.flags & GAUSSIAN != 0 {
-        // The smallest pixel that a window can touch bounds any weighted mean.
+        // The smallest pixel that a window can contain bounds any weighted mean.
         smallest_of(&mut out.part, &mut (-cover.reach..=cover.reach), |r| &r.smallest);
         for (x, least) in out.least.iter_mut().enumerate() {
             let near = &out.part[x..=x + 2 * blocks.margin];
@@ -212,8 +214,7 @@ fn bound(blocks: &Blocks, f: &Frame, y: usize, out: &mut Proof) {
     }
 }
 
-/// Where even the block's largest pixel does not pass against that bound, none of its pixels passes against its true
-/// mean.
+/// If even the block's largest pixel does not pass against that bound, none of its pixels passes against its true mean.
 #[multiversion(targets = "simd")]
 fn passing(f: &Frame, largest: &[u16], out: &mut Proof) {
     let deep = depth_shift(f);
@@ -226,7 +227,7 @@ fn passing(f: &Frame, largest: &[u16], out: &mut Proof) {
     }
 }
 
-/// What rounding adds to a sum before it is compared.
+/// Added to a sum so that a comparison with it rounds the mean.
 fn half(f: &Frame) -> i32 {
     if f.flags & GAUSSIAN != 0 { 0 } else { ((f.size * f.size) as i32 - 1) / 2 }
 }

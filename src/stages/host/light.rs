@@ -1,6 +1,6 @@
-//! In: a picture, what a row of tiles may hold. Out: the lit pixels of that row of tiles, by exact window means,
-//! looked for only where they were not ruled out.
-//! Frame and unit: pixels, tiles of 32 x 8 as eight words; grey levels of the picture's depth.
+//! In: a picture, the proof for a row of tiles. Out: the lit pixels of that row of tiles, from exact window means,
+//! which are computed only for pixels that may be lit. Frame and unit: pixels, tiles of 32 x 8 as eight words; grey
+//! levels of the picture's depth.
 
 use super::blocks::{Proof, level};
 use super::sample::{EDGE, Sample};
@@ -10,23 +10,23 @@ use crate::stages::{Frame, ThresholdParams};
 use multiversion::multiversion;
 use std::ops::{AddAssign, SubAssign};
 
-/// The lit pixels of a tile, a word a row.
+/// The lit pixels of a tile, one word for each row.
 pub type Tile = [u32; 8];
-/// Pixels of a tile's row.
+/// Pixels in a row of a tile.
 const WIDE: usize = 32;
-/// Pixels in question of a tile up to which each window is added up by itself. Beyond that the tile's columns are
-/// added up once for all.
+/// Up to this many pixels in question in a tile, each window is summed separately. Above it the tile's columns are
+/// summed once for all of them.
 const FEW: u32 = 6;
-/// Tiles beside each other that are added up together.
+/// Most neighbouring tiles whose columns are summed together.
 const MOST: usize = 16;
 
-/// A picture as the threshold sees it.
+/// A picture with the settings of the threshold.
 #[derive(Clone, Copy)]
 pub struct View<'a, T> {
     pub px: &'a [T],
     pub f: &'a Frame,
     pub p: ThresholdParams,
-    /// One axis of the Gaussian window.
+    /// Weights along one axis of the Gaussian window.
     pub weights: &'a [f32],
 }
 
@@ -38,7 +38,7 @@ impl<'a, T: Sample> View<'a, T> {
     }
 }
 
-/// Sums along the columns, and what is made of them.
+/// Reused memory: sums along the columns and values derived from them.
 #[derive(Default)]
 pub struct Sums<W> {
     rolled: Rolled<W>,
@@ -51,7 +51,7 @@ pub struct Sums<W> {
     wide: Vec<f32>,
 }
 
-/// The lit pixels of the row `ty` of tiles; `region` and `out` are that row's tiles.
+/// The lit pixels of row `ty` of tiles; `region` and `out` are that row's tiles.
 pub fn row<T: Sample>(
     v: View<T>,
     ty: usize,
@@ -62,7 +62,7 @@ pub fn row<T: Sample>(
 ) {
     let tiles = v.f.tiles_x as usize;
     let wanted = |tx: usize| region.is_none_or(|r| r[tx] != [0; 8]);
-    // Tiles whose columns are to be added up wait for their neighbours.
+    // Tiles whose columns must be summed wait for their neighbours.
     let mut run = 0..0;
     sums.few.clear();
     for tx in 0..tiles {
@@ -96,7 +96,7 @@ pub fn row<T: Sample>(
     }
 }
 
-/// Pixels of a tile that pass against the least window of their block, which is more than those that are lit.
+/// Pixels of a tile that pass against the least window of their block. They include all lit pixels.
 #[multiversion(targets = "simd")]
 fn in_question<T: Sample>(v: View<T>, tx: usize, ty: usize, four: [u8; 4], least: &[u32]) -> Tile {
     let (w, h) = (v.f.width as usize, v.f.height as usize);
@@ -116,14 +116,14 @@ fn in_question<T: Sample>(v: View<T>, tx: usize, ty: usize, four: [u8; 4], least
     tile
 }
 
-/// A word of 32 answers.
+/// A word of 32 answers, one bit each.
 #[inline(always)]
 fn bits(of: impl Fn(usize) -> bool) -> u32 {
     (0..WIDE).fold(0, |word, i| word | u32::from(of(i)) << i)
 }
 
-/// Tiles with few pixels in question: each window by itself, or, where that is less work, the columns of the whole
-/// picture from row to row by what enters and what leaves.
+/// Tiles with few pixels in question. Each window is summed separately or, if that is less work, the columns of the
+/// whole picture are updated from row to row: one row enters, one leaves.
 fn few<T: Sample>(v: View<T>, ty: usize, s: &mut Sums<T::Wide>, out: &mut [Tile]) {
     let (height, rows) = (v.f.size as usize, (v.f.height as usize - EDGE * ty).min(EDGE));
     let pixels: u32 = s.few.iter().flat_map(|(_, question)| question).map(|w| w.count_ones()).sum();
@@ -149,7 +149,7 @@ fn few<T: Sample>(v: View<T>, ty: usize, s: &mut Sums<T::Wide>, out: &mut [Tile]
     }
 }
 
-/// Sums along all columns of the picture, over the window's rows around one.
+/// Sums along all columns of the picture, over the window's rows around row `around`.
 #[derive(Default)]
 struct Rolled<W> {
     around: Option<usize>,
@@ -157,7 +157,7 @@ struct Rolled<W> {
 }
 
 impl<W> Rolled<W> {
-    /// Rows that are read on the way to a row.
+    /// Number of rows that are read to move the sums to row `y`.
     fn rows_to(&self, y: usize, height: usize) -> usize {
         self.around.and_then(|at| y.checked_sub(at)).map_or(height, |n| (2 * n).min(height))
     }
@@ -208,14 +208,14 @@ fn exchange<T: Sample>(enters: &[T], leaves: &[T], columns: &mut [T::Wide]) {
     }
 }
 
-/// The sum of the window around a pixel: its columns first, which for a row is one addition of all. `columns` is
-/// memory that is used again: what lies on the stack is taken apart into single numbers.
+/// The sum of the window around a pixel: first its columns, for which a whole row is added at once. `columns` is reused
+/// memory on the heap: the compiler would split an array on the stack into single numbers.
 #[multiversion(targets = "simd")]
 fn window<T: Sample>(v: View<T>, x: usize, y: usize, columns: &mut Vec<T::Wide>) -> u32 {
     let (w, r) = (v.f.width as usize, (v.f.size / 2) as usize);
     let (from, to) = (x.saturating_sub(r), (x + r + 1).min(w));
     let (left, right) = ((r - (x - from)) as u32, (x + r + 1 - to) as u32);
-    // Whole registers: some columns more, which are left out in the end.
+    // Whole registers: some more columns, which are excluded at the end.
     let n = (to - from).next_multiple_of(WIDE).min(w);
     let first = from.min(w - n);
     columns.clear();
@@ -229,7 +229,7 @@ fn window<T: Sample>(v: View<T>, x: usize, y: usize, columns: &mut Vec<T::Wide>)
     sum + columns[from - first..to - first].iter().map(|&c| T::number(c)).sum::<u32>()
 }
 
-/// A run of tiles, every pixel of them.
+/// All pixels of a run of tiles.
 fn settle<T: Sample>(v: View<T>, ty: usize, run: std::ops::Range<usize>, sums: &mut Sums<T::Wide>, out: &mut [Tile]) {
     if run.is_empty() {
         return;
@@ -241,7 +241,7 @@ fn settle<T: Sample>(v: View<T>, ty: usize, run: std::ops::Range<usize>, sums: &
     }
 }
 
-/// Column sums of all rows of the window, from row to row by what enters and what leaves; then the sums of the
+/// Column sums over all rows of the window, updated from row to row: one row enters, one leaves. Then the sums over the
 /// window's columns.
 #[multiversion(targets = "simd")]
 fn mean<T: Sample>(v: View<T>, ty: usize, run: std::ops::Range<usize>, s: &mut Sums<T::Wide>, out: &mut [Tile]) {
@@ -287,7 +287,7 @@ fn each<W: Copy + Default, T: Sample<Wide = W>>(row: &[T], from: isize, s: &mut 
     }
 }
 
-/// `n` pixels of a row from `from` on, the border's repeated.
+/// `n` pixels of a row from `from` on; beyond the border the border pixel repeats.
 #[inline(always)]
 fn widened<T: Sample>(row: &[T], from: isize, out: &mut Vec<T::Wide>, n: usize) {
     let left = (-from).clamp(0, n as isize) as usize;
@@ -301,11 +301,12 @@ fn widened<T: Sample>(row: &[T], from: isize, out: &mut Vec<T::Wide>, n: usize) 
     }
 }
 
-/// Sums of `size` columns beside each other: what lies before the last of them less what lies before the first.
+/// Sums of `size` neighbouring columns: the sum of all columns up to the last of them minus the sum of all before the
+/// first.
 #[inline(always)]
 fn across<W: Copy + Into<u32>>(columns: &[W], size: usize, before: &mut Vec<u32>, sums: &mut Vec<u32>) {
     before.resize(columns.len() + 1, 0);
-    // Of deep pictures all columns together may be more than a word holds; their differences are not.
+    // In deep pictures the sum of all columns may overflow a word, but the differences do not.
     let mut all = 0u32;
     for (before, &column) in before.iter_mut().zip(columns) {
         *before = all;
@@ -316,7 +317,7 @@ fn across<W: Copy + Into<u32>>(columns: &[W], size: usize, before: &mut Vec<u32>
     sums.extend(before[size..].iter().zip(&*before).map(|(to, from)| to.wrapping_sub(*from)));
 }
 
-/// Along the row first, then down the columns, both in f32 and in ascending order, as the shader does.
+/// First along the row, then down the columns, both in f32 and in ascending order, as in the shader.
 #[multiversion(targets = "simd")]
 fn gaussian<T: Sample>(v: View<T>, ty: usize, run: std::ops::Range<usize>, s: &mut Sums<T::Wide>, out: &mut [Tile]) {
     let (w, h, r) = (v.f.width as usize, v.f.height as usize, (v.f.size / 2) as isize);

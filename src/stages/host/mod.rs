@@ -1,7 +1,6 @@
-//! In: pictures, one at a time. Out: their skeleton pixels, peaks and points, from the processor of this machine, in
-//! the order and by the proofs of the GPU's chain: statistics of every pixel, then only the tiles that may hold a lit
-//! one.
-//! Frame and unit: pixels; points in the poses' frame, mm.
+//! In: pictures, one at a time. Out: their skeleton pixels, peaks and points, computed on the processor of this
+//! machine. The order and the proofs are those of the GPU's chain: statistics of every pixel, then only the tiles that
+//! may contain a lit pixel. Frame and unit: pixels; points in the poses' frame, mm.
 
 use super::chain::config::ChainConfig;
 use super::chain::measure::Measure;
@@ -29,8 +28,8 @@ use sample::Sample;
 use std::sync::Mutex;
 use thinning::{Tiles, Worn};
 
-/// The chain for one kind of picture. Shared among threads, each of which works on a picture of its own; a large
-/// picture is divided among those that are free.
+/// The chain for one size and depth of pictures. Threads share it, and each works on a different picture. A large
+/// picture is divided among the threads that are free.
 pub struct Host {
     frame: Frame,
     threshold: ThresholdParams,
@@ -40,45 +39,46 @@ pub struct Host {
     region: Option<Vec<Tile>>,
     ambient: Option<Image>,
     measure: Option<(PeakFrame, Lines, Measure)>,
-    /// Memory that is used again.
+    /// Reused memory.
     spare: Mutex<Vec<Work>>,
 }
 
-/// What one shot came to.
+/// The result of one shot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Found {
     /// Skeleton pixels x | y << 16, in the order of the GPU's list.
     pub pixels: Vec<u32>,
-    /// One peak a skeleton pixel, and its point, where they are measured.
+    /// One peak for each skeleton pixel, if peaks are measured.
     pub peaks: Vec<Peak>,
-    /// The peaks' points, entry by entry, mm in the poses' frame; not a number where the peak was refused.
+    /// One point for each peak, mm in the poses' frame; NaN if the peak was rejected.
     pub points: Vec<Point>,
 }
 
-/// What is remembered from picture to picture.
+/// Memory that is reused from picture to picture.
 #[derive(Default)]
 struct Work {
     bands: Vec<Band>,
     lit: Tiles,
     thin: Tiles,
-    /// Places of the tiles with a lit pixel, in the order of the skeleton's list.
+    /// Indices of the tiles with a lit pixel, in the order of the skeleton's list.
     list: Vec<u32>,
     worn: Worn,
     added: Vec<(i32, i32)>,
-    /// What is kept of the skeleton, in the order of the list.
+    /// The skeleton tiles after `space`, in the order of the list.
     kept: Vec<Tile>,
 }
 
-/// Rows of tiles that one thread goes through from above to below.
+/// Rows of tiles that one thread processes from top to bottom.
 struct Band {
     blocks: Blocks,
     proof: Proof,
-    /// Places of its tiles with a lit pixel.
+    /// Indices of its tiles with a lit pixel.
     list: Vec<u32>,
 }
 
 impl Host {
-    /// Works out what all pictures share; `Err` on settings out of range or an ambient picture that does not fit.
+    /// Computes everything that all pictures share. `Err` if settings are out of range or the ambient picture does not
+    /// fit.
     pub fn new(config: &ChainConfig) -> Result<Host> {
         let mut frame = Frame::new(config.width, config.height, config.bits, 1, &config.threshold)?;
         frame.flags |= if config.prune { 0 } else { ALL_TILES };
@@ -110,7 +110,7 @@ impl Host {
         })
     }
 
-    /// Skeleton pixels of a picture and, where they are measured, peaks and points; `pose` as [`point::pose_words`].
+    /// Skeleton pixels of a picture and, if they are measured, peaks and points; `pose` as from [`point::pose_words`].
     pub fn run(&self, shot: u32, image: &Image, pose: &[f32; 12]) -> Result<Found> {
         self.work(image, true, |work, image| {
             let pixels = work.pixels();
@@ -127,12 +127,13 @@ impl Host {
         })
     }
 
-    /// The lit pixels of a picture and their skeleton before its ends are carried on, for tests and pictures.
+    /// The lit pixels of a picture, and their skeleton before its ends are lengthened; for tests and pictures.
     pub fn masks(&self, image: &Image) -> Result<[Mask; 2]> {
         self.work(image, false, |work, _| [&work.lit, &work.thin].map(|m| mask(m, &self.frame)))
     }
 
-    /// Finds the skeleton of a picture without the ambient light, with its ends carried on or not, and hands both on.
+    /// Subtracts the ambient light and finds the skeleton; `ends` says whether its ends are lengthened and its pixels
+    /// spaced. Passes the work and the picture to `then`.
     fn work<R>(&self, image: &Image, ends: bool, then: impl FnOnce(&Work, &Image) -> R) -> Result<R> {
         self.frame.accept(image)?;
         let spare = self.spare.lock().unwrap_or_else(|e| e.into_inner()).pop();
@@ -185,7 +186,7 @@ impl Host {
         }
     }
 
-    /// Keeps one pixel a crossing of a wide stripe, and none without company.
+    /// Keeps one pixel in each column of a wide stripe, and no isolated lit pixels.
     fn space(&self, work: &mut Work) {
         let (w, h) = (self.frame.width as i32, self.frame.height as i32);
         let (lit, thin, kept) = (&work.lit, &work.thin, &mut work.kept);
@@ -200,7 +201,7 @@ impl Host {
             }
             let alone = thin.alone(at as usize, setting & !COMPANY);
             std::array::from_fn(|r| {
-                // What has nothing near it is a run by itself.
+                // A pixel without any other near it is a run of one.
                 let mut some = alone[r];
                 let mut left = thin.words[at as usize][r] & !some;
                 while left != 0 {
@@ -218,7 +219,7 @@ impl Host {
         }
     }
 
-    /// Carries the skeleton's ends on; only lit pixels are added, so they lie in listed tiles.
+    /// Lengthens the skeleton's ends. Only lit pixels are added, so they lie in listed tiles.
     fn lengthen<T: Sample>(&self, px: &[T], work: &mut Work) {
         let (w, h) = (self.frame.width as i32, self.frame.height as i32);
         work.added.clear();
@@ -268,7 +269,7 @@ impl Work {
         pixels
     }
 
-    /// Only listed tiles hold anything.
+    /// Clears the listed tiles; all others are empty.
     fn clear(&mut self) {
         for &at in &self.list {
             self.lit.words[at as usize] = [0; 8];

@@ -1,15 +1,14 @@
-//! In: grey levels of 8 bits or of 9 to 16. Out: the numbers that their sums are held in, what the proof needs of
-//! four blocks.
-//! Frame and unit: grey levels.
+//! In: grey levels of 8 bits or of 9 to 16. Out: the number types of their sums; the statistics of four blocks for the
+//! proof. Frame and unit: grey levels.
 
 use std::ops::{AddAssign, SubAssign};
 
 /// Edge of a block, px.
 pub const EDGE: usize = 8;
-/// Blocks of a tile, side by side.
+/// Number of blocks in a tile, side by side.
 pub const FOUR: usize = 4;
 
-/// Of each of four blocks side by side: sum, smallest sums of a row and of a column, largest and smallest pixel.
+/// Statistics of four blocks side by side: sum, smallest sums of a row and of a column, largest and smallest pixel.
 #[derive(Debug, Default, PartialEq)]
 pub struct Four {
     pub sum: [u32; FOUR],
@@ -19,19 +18,19 @@ pub struct Four {
     pub smallest: [u32; FOUR],
 }
 
-/// A pixel.
+/// A pixel's grey level.
 pub trait Sample: Copy + Ord + Default + Send + Sync + Into<f32> + 'static {
-    /// Holds the sum of 101 pixels, and of a block.
+    /// A type that can hold the sum of 101 pixels, and of a block.
     type Wide: Copy + Ord + Default + AddAssign + SubAssign + Into<u32>;
     fn wide(self) -> Self::Wide;
     fn number(wide: Self::Wide) -> u32 {
         wide.into()
     }
-    /// Of the four blocks that begin at this pixel of eight lines.
+    /// Statistics of the four blocks that begin at pixel `from` of eight lines.
     fn four(lines: &[&[Self]; EDGE], from: usize) -> Four;
 }
 
-/// Sums of a word's bytes, `even` and `odd` ones held in 16 bits each.
+/// Sum of a word's bytes; `even` and `odd` have 16 bits for each of them.
 #[inline(always)]
 fn together(even: u64, odd: u64) -> u32 {
     let pairs = even + odd;
@@ -47,8 +46,8 @@ impl Sample for u8 {
     }
     #[inline(always)]
     fn four(lines: &[&[u8]; EDGE], from: usize) -> Four {
-        // The eight pixels of a block's row are one word: every other byte of it, summed by themselves, are the
-        // columns' sums, and bytes added up two, four and eight together the row's.
+        // The eight pixels of a block's row are one word. Its even and odd bytes, summed separately over the rows, give
+        // the sums of the columns. Bytes added up two, four and eight at a time give the sum of the row.
         const EVERY_OTHER: u64 = 0x00ff_00ff_00ff_00ff;
         let (mut even, mut odd, mut row) = ([0u64; FOUR], [0u64; FOUR], [u32::MAX; FOUR]);
         let (mut largest, mut smallest) = ([0u8; 32], [u8::MAX; 32]);
@@ -66,7 +65,7 @@ impl Sample for u8 {
                 row[b] = row[b].min(together(e, o));
             }
         }
-        // Halves of the words are folded onto each other, for all blocks at once; what counts ends in the lowest lane.
+        // The halves of the words are folded onto each other, for all blocks at once; the result is in the lowest lane.
         let mut least: [u16; 16] = bytemuck::cast(even);
         let others: [u16; 16] = bytemuck::cast(odd);
         for i in 0..16 {
@@ -141,7 +140,7 @@ impl Sample for u16 {
 mod tests {
     use super::*;
 
-    /// Pixel by pixel.
+    /// The same statistics, computed pixel by pixel.
     fn plain<T: Sample>(lines: &[[T; 32]; EDGE]) -> Four {
         let of = |b: usize, r: usize, i: usize| T::number(lines[r][EDGE * b + i].wide());
         let all = |b: usize| (0..EDGE * EDGE).map(move |k| of(b, k / EDGE, k % EDGE));
@@ -162,7 +161,7 @@ mod tests {
             let lines: [[T; 32]; EDGE] = std::array::from_fn(|_| {
                 std::array::from_fn(|_| {
                     s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-                    // Nothing, everything, and all between.
+                    // All bits 0, all bits 1, and random values.
                     level(match round {
                         0 => 0,
                         1 => u64::MAX,

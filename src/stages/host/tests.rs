@@ -1,6 +1,6 @@
-//! In: the scenes of the stage tests and random pictures, sizes and settings. Out: the chain on this machine's
-//! processor gives the masks and skeletons of the plain twins, pixel for pixel, and their peaks and points.
-//! Frame and unit: pixels.
+//! In: the scenes of the stage tests, and random pictures, sizes and settings. Out: whether the chain on this machine's
+//! processor gives the masks and skeletons of the plain twins, pixel for pixel, and their peaks and points. Frame and
+//! unit: pixels.
 
 use super::*;
 use crate::stages::Window;
@@ -10,7 +10,7 @@ use crate::stages::noise::Noise;
 use crate::stages::stripe::lengthen::LengthenParams;
 use crate::stages::stripe::{lengthen, point, spacing, thin};
 
-/// The plain way, every pixel: lit, thinned, and the list after the ends were carried on.
+/// The plain path over every pixel: lit pixels, thinned mask, and the list after lengthening and spacing.
 fn plain(image: &Image, c: &ChainConfig) -> (Mask, Mask, Vec<u32>) {
     let image = c.ambient.as_ref().map_or(image.clone(), |a| ambient::without(image, a));
     let mut lit = threshold::twin(&image, &c.threshold);
@@ -29,12 +29,12 @@ fn plain(image: &Image, c: &ChainConfig) -> (Mask, Mask, Vec<u32>) {
     (lit, thinned, pixels)
 }
 
-/// The stripe's width for the ends.
+/// The stripe's width for lengthening, px.
 const WIDTH_PX: f32 = 3.0;
 
 fn same(name: &str, host: &Host, image: &Image, c: &ChainConfig) {
     let (lit, thinned, pixels) = plain(image, c);
-    // Twice: what the first picture left behind must not be found in the second.
+    // Run twice: results of the first picture must not appear in the second.
     for turn in 0..2 {
         let masks = host.masks(image).unwrap();
         assert!(masks[0] == lit, "{name}, turn {turn}: lit pixels");
@@ -70,7 +70,7 @@ fn masks_and_skeletons_of_the_scenes_are_those_of_the_twins() {
     }
 }
 
-/// A picture of one of many kinds: stripes upright and lying, noise of any strength, steps, spots, gradients.
+/// A picture of one of several kinds: stripes upright and lying, noise of any strength, steps, spots, gradients.
 fn any_picture(w: u32, h: u32, bits: u8, random: &mut Noise) -> Image {
     let full = (1u32 << bits) - 1;
     let (kind, sigma, base) = (random.next() % 7, f64::from(1 + random.next() % 40) / 255.0, random.next() % 200);
@@ -130,14 +130,14 @@ fn masks_and_skeletons_of_random_pictures_are_those_of_the_twins() {
     }
 }
 
-/// Rows of a band are worked out as they are needed, over those of the picture before: none of that may be taken for
-/// this one's.
+/// Rows of a band are computed when they are needed, over those of the previous picture, which must not be used for
+/// this one.
 #[test]
 fn what_a_picture_left_behind_says_nothing_of_the_next() {
     let (w, h) = (320, 700);
     let bright = drawn(w, h, 8, |x, y| 230 + (x * 31 + y * 17) % 9);
-    // Bright above and dark below, another edge every 40 rows, and beneath each a faint line: there a window is
-    // darkest at its lower end, which is what is worked out last.
+    // Bright above and dark below, with an edge every 40 rows and a faint line beneath each. There a window is darkest
+    // at its lower end, which is computed last.
     let edges = |shift: u32| {
         drawn(w, h, 8, move |x, y| match (y + shift) % 40 {
             0..20 => 120 + (x * 31 + y * 17) % 3,
@@ -156,7 +156,7 @@ fn what_a_picture_left_behind_says_nothing_of_the_next() {
     }
 }
 
-/// A picture so large that it is divided among threads, with a second stripe where none was expected.
+/// A picture so large that it is divided among threads, with a second stripe in an unexpected place.
 #[test]
 fn a_second_stripe_anywhere_in_a_large_picture_is_found() {
     let (w, h) = (2048, 1400);

@@ -1,6 +1,6 @@
-//! In: the lit tiles of a picture. Out: the same thinned to lines one pixel wide, nothing left to delete.
-//! Frame and unit: tiles of 32 x 8 pixels as eight words, with a border of dark ones. The rule is that of the stage
-//! `thin`.
+//! In: the lit tiles of a picture. Out: the same tiles thinned to lines one pixel wide, from which nothing more can be
+//! deleted. Frame and unit: tiles of 32 x 8 pixels as eight words, with a border of dark tiles. The rule is that of the
+//! stage `thin`.
 
 use super::light::Tile;
 use crate::stages::Thinning;
@@ -11,7 +11,7 @@ use multiversion::multiversion;
 #[derive(Clone, Default)]
 pub struct Tiles {
     pub words: Vec<Tile>,
-    /// From one row of tiles to the next.
+    /// Distance in `words` from one row of tiles to the next.
     pub stride: usize,
 }
 
@@ -20,7 +20,7 @@ impl Tiles {
         let stride = tiles_x as usize + 2;
         Tiles { words: vec![[0; 8]; stride * (tiles_y as usize + 2)], stride }
     }
-    /// A pixel within the picture or at most 8 beyond it.
+    /// Whether a pixel is set; it may lie in the picture or at most 8 pixels beyond it.
     #[inline(always)]
     pub fn get(&self, x: i32, y: i32) -> bool {
         let at = ((y >> 3) + 1) as usize * self.stride + ((x >> 5) + 1) as usize;
@@ -30,16 +30,16 @@ impl Tiles {
         let at = ((y >> 3) + 1) as usize * self.stride + ((x >> 5) + 1) as usize;
         self.words[at][(y & 7) as usize] |= 1 << (x & 31);
     }
-    /// Column and row of the tile at a place.
+    /// Column and row of the tile at an index.
     pub fn tile(&self, at: u32) -> (u32, u32) {
         (at % self.stride as u32 - 1, at / self.stride as u32 - 1)
     }
-    /// Skeleton pixels of a tile with one or two neighbours: among them are all ends.
+    /// Skeleton pixels of a tile with one or two neighbours. They include all ends.
     #[inline(always)]
     pub fn ends(&self, at: usize) -> Tile {
         let around = self.around(at);
         std::array::from_fn(|r| {
-            // Counted up to three with a chain of bit adders.
+            // Neighbours are counted up to three with a chain of bit adders.
             let (mut one, mut two, mut more) = (0, 0, 0);
             for n in around[r] {
                 more |= two & one & n;
@@ -50,8 +50,8 @@ impl Tiles {
             self.words[at][r] & (one ^ two) & !more
         })
     }
-    /// Pixels of a tile with no other one above or below them within the distance of a spacing's setting; none are
-    /// told of settings that look along rows or beyond the tiles beside it.
+    /// Pixels of a tile without another one above or below them within the distance of a spacing's setting. Empty for
+    /// settings along rows or with a distance beyond the neighbouring tiles.
     #[inline(always)]
     pub fn alone(&self, at: usize, spacing: u32) -> Tile {
         if spacing == 0 || spacing > 8 {
@@ -64,12 +64,12 @@ impl Tiles {
             self.words[at][r] & !near
         })
     }
-    /// Pixels of a tile with another one within so many columns and rows, at most 8.
+    /// Pixels of a tile with another one within `near` columns and rows; `near` is at most 8.
     #[inline(always)]
     pub fn in_company(&self, at: usize, near: usize) -> Tile {
         let columns = [at - 1, at, at + 1].map(|at| [at - self.stride, at, at + self.stride].map(|at| self.words[at]));
-        // Of the rows of the tile and of those above and below it, 8 each: whether a pixel beside a place is set, or
-        // it too.
+        // For the rows of the tile and of the tiles above and below, 8 each. `beside`: whether a pixel to the left or
+        // right of a place is set. `within`: that, or the place's own pixel.
         let beside: [u32; 24] = std::array::from_fn(|r| {
             let [west, own, east] = columns.map(|rows| rows[r / 8][r % 8]);
             (1..=near).fold(0, |near, d| near | own << d | west >> (32 - d) | own >> d | east << (32 - d))
@@ -83,7 +83,7 @@ impl Tiles {
     /// The eight neighbours of every pixel of a tile, row by row.
     #[inline(always)]
     pub fn around(&self, at: usize) -> [Neighbours; 8] {
-        // Rows -1 to 8 of a tile and of those beside it.
+        // Rows -1 to 8 of a tile.
         let column = |at: usize| -> [u32; 10] {
             let own = self.words[at];
             std::array::from_fn(|r| match r {
@@ -112,17 +112,18 @@ impl Tiles {
     }
 }
 
-/// What thinning remembers between two pictures.
+/// Memory for thinning that is reused from picture to picture.
 #[derive(Default)]
 pub struct Worn {
-    /// Up to which sub-iteration a tile has to be looked at, because it or a neighbour changed.
+    /// Last sub-iteration in which a tile must be examined, because it or a neighbour changed.
     due: Vec<u32>,
     active: Vec<u32>,
     gone: Vec<Tile>,
 }
 
-/// Thins the listed tiles of a picture of that size: sub-iterations until two in a row delete nothing. A tile whose
-/// surroundings did not change in the last two is left alone: the same rule was applied to the same pixels before.
+/// Thins the listed tiles of a picture of that size: sub-iterations until two in a row delete nothing. A tile is
+/// skipped if its neighbourhood did not change in the last two, because the same rule was already applied to the same
+/// pixels.
 pub fn thin(mask: &mut Tiles, list: &[u32], (width, height): (u32, u32), rule: Thinning, worn: &mut Worn) {
     if width < 3 || height < 3 {
         return;
@@ -154,7 +155,7 @@ pub fn thin(mask: &mut Tiles, list: &[u32], (width, height): (u32, u32), rule: T
             }
         }
     }
-    // Neighbours of listed tiles may have been marked that are not listed: they are dark and stay so.
+    // Neighbours that are not listed may have been marked as due: they are dark and stay dark.
     for &at in list {
         for row in [at as usize - mask.stride, at as usize, at as usize + mask.stride] {
             worn.due[row - 1..=row + 1].fill(0);
@@ -162,7 +163,7 @@ pub fn thin(mask: &mut Tiles, list: &[u32], (width, height): (u32, u32), rule: T
     }
 }
 
-/// Pixels that go in one sub-iteration, of every listed tile.
+/// Pixels that one sub-iteration deletes, for every listed tile.
 #[multiversion(targets = "simd")]
 fn decide<const ZHANG_SUEN: bool>(
     mask: &Tiles,
@@ -176,7 +177,7 @@ fn decide<const ZHANG_SUEN: bool>(
         let (tx, ty) = mask.tile(at);
         let around = mask.around(at as usize);
         let own = mask.words[at as usize];
-        // OpenCV never touches the outermost rows and columns.
+        // As in OpenCV, the outermost rows and columns stay.
         let inside = interior(width, tx as usize);
         for r in 0..8 {
             gone[r] = own[r] & inside & deletions(rule, &around[r], step % 2 == 1);

@@ -1,6 +1,6 @@
-//! In: pictures, skeleton pixels, the expected stripe. Out: the level beside it; peaks by the maximum-likelihood
-//! Gaussian across.
-//! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (2) to (5).
+//! In: pictures, skeleton pixels, the expected stripe. Out: the level beside the stripe; peaks by a maximum-likelihood
+//! fit of a Gaussian across it. Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe
+//! peak (2) to (5).
 
 use super::PeakFrame;
 use super::across::centre::centred;
@@ -11,22 +11,22 @@ use super::lanes::LANES;
 use super::profile::{Profiles, Seen, centre_at};
 use super::scoring;
 
-/// Nearer than so many pixels lies a narrow stripe's own light, more on the side that its centre is nearer to.
+/// Distance in px within which a narrow stripe's own light lies, more of it on the side that its centre is closer to.
 pub(in crate::stages) const BESIDE: i32 = 4;
-/// Variances of a pixel by as many pixels a side: what two sides of one level differ by, squared, is twice that on
-/// average, and hardly ever four times as much.
+/// Limit for the squared difference of two sides of one level, in units of a pixel's variance over the pixels of a
+/// side. The mean of that is 2, and four times the mean is hardly ever exceeded.
 pub(in crate::stages) const BY_NOISE: f32 = 8.0;
 
-/// Level beside the stripe, 4 to 6 widths out: the darker side, because a second stripe lights one side only. On
-/// three lines 1.2 widths apart: a level with the noise of three pixels would be the largest error of a profile
-/// averaged over many. And by how much, squared, the sides differ beyond their noise: within the stripe nobody knows
-/// which of the two it is.
+/// Level beside the stripe, 4 to 6 widths away: that of the darker side, because a second stripe lights only one side.
+/// It is the mean of three lines 1.2 widths apart: with the noise of only three pixels it would be the largest error of
+/// a profile averaged over many. The second value is the squared difference of the two sides beyond their noise,
+/// because which of the two levels the stripe lies on is unknown.
 #[inline(always)]
 pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s: &PeakFrame) -> (f32, f32) {
     let from = (4.0 * s.s0 + 0.5).floor() as i32;
     let to = from + ((2.0 * s.s0 + 0.5).floor() as i32).max(2);
     let along = 1.2 * s.s0;
-    // Not 0.5: at slopes of 1 in 32 and the like rounding would decide.
+    // Not 0.5, so that rounding errors do not decide at slopes such as 1 in 32.
     let (along_u, along_v) = ((along * ny + 0.47).floor() as i32, (0.47 - along * nx).floor() as i32);
     let (mut low, mut high, mut n) = (0, 0, 0f32);
     let mut q = from;
@@ -44,11 +44,11 @@ pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s:
     (base, if from >= BESIDE { uneven2 } else { 0.0 })
 }
 
-/// Puts the profiles of up to [`LANES`] skeleton pixels side by side.
+/// Stores the profiles of up to [`LANES`] skeleton pixels side by side.
 #[inline(always)]
 pub(super) fn look<G: Grey>(places: &[Place<G>], profiles: &mut Profiles, s: &PeakFrame) -> [Seen; LANES] {
     let mut seen = [Seen::default(); LANES];
-    // Farther than that none of them looks: the direction, the level beside the stripe, the profile.
+    // Farthest pixel that is read for the direction, the level beside the stripe and the profile.
     let beside_stripe = (8.0 * s.s0 + 4.0).max(s.radius + 4.5 * s.s0 + 9.0);
     let reach = (3 * s.lattice_u.max(s.lattice_v)).max(beside_stripe as i32);
     let inner = |x: i32, y: i32| x.min(y) >= reach && x < s.width - reach && y < s.height - reach;
@@ -63,7 +63,7 @@ pub(super) fn look<G: Grey>(places: &[Place<G>], profiles: &mut Profiles, s: &Pe
     seen
 }
 
-/// Puts the profile at a place into a lane.
+/// Stores the profile at a place in a lane.
 #[inline(always)]
 fn put<G: Grey>(image: G, (x, y): (i32, i32), lane: usize, profiles: &mut Profiles, s: &PeakFrame) -> Seen {
     let n = direction(image, x, y, s);
@@ -73,7 +73,7 @@ fn put<G: Grey>(image: G, (x, y): (i32, i32), lane: usize, profiles: &mut Profil
     seen
 }
 
-/// Peaks of up to [`LANES`] skeleton pixels: their profiles, then the Gaussians of all of them at once.
+/// Peaks of up to [`LANES`] skeleton pixels: their profiles, then all their Gaussian fits at once.
 #[inline(always)]
 pub(super) fn gaussians<G: Grey>(
     places: &[Place<G>],

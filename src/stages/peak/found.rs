@@ -1,11 +1,10 @@
-//! In: nothing. Out: one peak, as the stages write it, and why one is not taken.
-//! Frame and unit: px, grey levels.
+//! In: nothing. Out: the record of one peak, and the reasons for rejecting one. Frame and unit: px, grey levels.
 
-/// Why a peak is not believed; the low 8 bits of `Peak::flags`.
+/// Why a peak is rejected; the low 8 bits of `Peak::flags`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Reject {
-    /// No reason against it.
+    /// Not rejected.
     Kept = 0,
     /// Outside the image of the working volume.
     Region = 1,
@@ -28,7 +27,7 @@ pub enum Reject {
 }
 
 impl Reject {
-    /// All of them, in the order of their numbers.
+    /// All reasons, in the order of their numbers.
     pub const ALL: [Reject; 10] = [
         Reject::Kept,
         Reject::Region,
@@ -41,7 +40,7 @@ impl Reject {
         Reject::Unsupported,
         Reject::NoPoint,
     ];
-    /// In words, for reports and legends.
+    /// Name for reports and legends.
     pub fn words(self) -> &'static str {
         match self {
             Reject::Kept => "kept",
@@ -60,10 +59,10 @@ impl Reject {
 
 /// A bit of `Peak::flags`: at least one pixel of the fit was saturated.
 pub const SATURATED: u32 = 1 << 8;
-/// Of [`Peak::flags`]: where the number of its [`Reject`] stands.
+/// The bits of [`Peak::flags`] that hold the number of its [`Reject`].
 pub const REASON: u32 = 0xff;
 
-/// One peak, 12 words, the same layout on the GPU.
+/// One peak, 12 words, with the same layout on the GPU.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Peak {
@@ -73,7 +72,7 @@ pub struct Peak {
     pub v: f32,
     /// Unit vector across the stripe; v component positive, or u where v is 0.
     pub normal_u: f32,
-    /// Its v component, 0..=1.
+    /// The v component of that vector, 0..=1.
     pub normal_v: f32,
     /// Height of the profile above the background, grey levels; may exceed full scale when saturated.
     pub amplitude: f32,
@@ -83,26 +82,26 @@ pub struct Peak {
     pub width_px: f32,
     /// Standard deviation of the centre along the normal, px.
     pub sigma_px: f32,
-    /// Amplitude over the noise of a background pixel.
+    /// Amplitude over the standard deviation of a background pixel's noise.
     pub snr: f32,
     /// Low 8 bits: [`Reject`]; bit 8: [`SATURATED`].
     pub flags: u32,
     /// Skeleton pixel, x | y << 16.
     pub pixel: u32,
-    /// Number of the shot; from the GPU within its batch.
+    /// Number of the shot; on the GPU within its batch.
     pub shot: u32,
 }
 
 impl Peak {
-    /// No test has refused it.
+    /// Whether no test has rejected it.
     pub fn kept(&self) -> bool {
         self.flags & REASON == 0
     }
-    /// Why it was refused; [`Reject::Kept`] where it was not.
+    /// Why it was rejected; [`Reject::Kept`] if it was not.
     pub fn reject(&self) -> Reject {
         Reject::ALL[(self.flags & REASON).min(9) as usize]
     }
-    /// Sets the reason, unless one is set already: the first test that fails names it.
+    /// Sets the reason, unless one is already set: the first test that fails determines it.
     pub fn refuse(&mut self, why: Reject) {
         if self.kept() {
             self.flags |= why as u32;

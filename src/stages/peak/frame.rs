@@ -1,5 +1,5 @@
-//! In: the pictures' layout, the settings of peaks and their choice. Out: the uniform block of the stages lines and
-//! peak, every size worked out once. Frame and unit: pixels, grey levels of the picture's depth.
+//! In: the pictures' layout, the settings of peaks and of their choice. Out: the uniform block of the stages lines and
+//! peak, with every size computed once. Frame and unit: pixels, grey levels of the picture's depth.
 
 use super::across::turn::{WEIGHTS, deep, flattest, turn};
 use super::params::{PeakParams, SAMPLES};
@@ -9,12 +9,12 @@ use crate::stages::stripe::choose_params::ChooseParams;
 use crate::stages::stripe::thin::slanted;
 use glam::Vec2;
 
-/// Samples for which the noise model counts: of a profile's own scatter a few samples tell little.
+/// The noise model counts like this many samples, because a profile's few samples alone show little of the noise.
 const BELIEF: f32 = 10.0;
-/// The same where the noise is correlated from sample to sample.
+/// The same if the noise is correlated from sample to sample.
 const GRAINED: f32 = 1e4;
 
-/// Share of the gradients on a straight stripe that do not point across it: without noise, and by the square of the
+/// Share of the gradients on a straight stripe that do not point across it: without noise, and per square of the
 /// speckle's contrast. Measured on stripes of 0.7 and 2 px at 0 to 60 degrees, contrasts of 0 to 0.5.
 const ROUGH: f32 = 0.02;
 const SPECKLED: f32 = 0.75;
@@ -23,9 +23,9 @@ const SPECKLED: f32 = 0.75;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct PeakFrame {
-    /// px
+    /// Width of the picture, px.
     pub width: i32,
-    /// px
+    /// Height of the picture, px.
     pub height: i32,
     /// Words of one picture row.
     pub pitch: u32,
@@ -37,21 +37,21 @@ pub struct PeakFrame {
     pub full_scale: f32,
     /// Variance of read noise; grey levels squared.
     pub read2: f32,
-    /// Variance per grey level.
+    /// Variance of shot noise per grey level.
     pub gain: f32,
-    /// Square of the speckle contrast, 0..=1, times what its grains add.
+    /// Square of the speckle contrast, 0..=1, times the square of the factor that its grains add.
     pub speckle2: f32,
-    /// Samples for which the noise model counts.
+    /// Number of samples that the noise model counts for.
     pub belief: f32,
     /// 1 / R², px⁻²; the weight along the stripe is (1 - t² / R²)², close to a Gaussian of sigma R / 2.4.
     pub along_factor: f32,
-    /// Half window along the stripe, px; 0 where one line across it is read.
+    /// Half window along the stripe, px; 0 if only one line across it is read.
     pub radius: f32,
-    /// Spacing of the grey levels that the direction is taken from along the picture's axes, px.
+    /// Spacing along the rows of the grey levels from which the direction is computed, px.
     pub lattice_u: i32,
-    /// The same along the columns.
+    /// The same spacing along the columns, px.
     pub lattice_v: i32,
-    /// Step of the background's samples, px.
+    /// Step between the background's samples, px.
     pub stride: i32,
     /// Most Gauss-Newton steps, 1..=20.
     pub steps: u32,
@@ -65,42 +65,43 @@ pub struct PeakFrame {
     pub uncertain: f32,
     /// Least cosine of the angle between a peak's normal and the direction of depth.
     pub upright: f32,
-    /// Direction of depth in the picture, a unit vector: along the rows.
+    /// Direction of depth in the picture, a unit vector: its component along the rows.
     pub across_u: f32,
-    /// Direction of depth in the picture: along the columns.
+    /// Its component along the columns.
     pub across_v: f32,
-    /// Lines across the stripe in one picture.
+    /// Number of lines across the stripe in one picture.
     pub lines: u32,
-    /// 1 where those lines are columns, 0 where they are rows.
+    /// 1 if those lines are columns, 0 if they are rows.
     pub columns: u32,
-    /// Entries of the strongest peaks' list, all shots.
+    /// Entries of the list of strongest peaks, over all shots.
     pub entries: u32,
-    /// Columns or rows of a line, about a stripe's width: what is strongest within five widths needs no finer lines.
+    /// Columns or rows in a line, about a stripe's width. Finer lines are not needed for the strongest peak within five
+    /// widths.
     pub line_px: u32,
-    /// Groups of four columns that a profile is added up from; 0 where the stripe is so narrow that each goes by
-    /// itself.
+    /// Groups of four columns over which a profile is summed; 0 if the stripe is so narrow that columns are read one by
+    /// one.
     pub fours: i32,
-    /// Half of a profile that stands upright, samples.
+    /// Half the length of an upright stripe's profile, samples.
     pub half_across: f32,
-    /// Rows of a sample of the profile, beside each other.
+    /// Neighbouring rows that form one sample of the profile.
     pub rows: i32,
-    /// Turn of the direction that was seen, rad: times sine of twice its angle.
+    /// Correction of the measured direction, rad: coefficient of the sine of twice its angle.
     pub turn_2: f32,
-    /// The same for four times the angle.
+    /// The same for the sine of four times the angle.
     pub turn_4: f32,
-    /// The same for six times the angle.
+    /// The same for the sine of six times the angle.
     pub turn_6: f32,
-    /// The same for eight times the angle.
+    /// The same for the sine of eight times the angle.
     pub turn_8: f32,
-    /// For steep stripes, on a square lattice: four times the angle.
+    /// For steep stripes, on a square lattice: coefficient for four times the angle.
     pub square_4: f32,
-    /// For steep stripes, on a square lattice: eight times the angle.
+    /// For steep stripes, on a square lattice: coefficient for eight times the angle.
     pub square_8: f32,
-    /// Cosine of twice the angle up to which a stripe is seen flat; below -1 where none is.
+    /// Cosine of twice the angle up to which a stripe counts as flat; below -1 if no stripe does.
     pub flat: f32,
-    /// Share of a straight stripe's gradients that do not point across it, for its lattice and its speckle.
+    /// Share of a straight stripe's gradients that do not point across it, for its speckle.
     pub ragged: f32,
-    /// What read noise adds to the sum of those gradients' squares; grey levels squared, ten bits a gradient.
+    /// What read noise adds to the sum of the squared gradients; grey levels squared, with ten bits a gradient.
     pub restless: f32,
 }
 
@@ -113,9 +114,9 @@ pub const UNIFORM: (&str, &[Field], usize) = crate::stages::frame::uniform_field
     rows, turn_2, turn_4, turn_6, turn_8, square_4, square_8, flat, ragged, restless);
 
 impl PeakFrame {
-    /// Quads of samples of a profile, which the shader has written out: -2 quads up to 2 quads - 1, so that the shorter
-    /// side still has all of an upright profile. They hold all of it on lines up to 31 degrees off an image axis;
-    /// beyond that the outermost flanks are left out, at 45 degrees those from 2.5 widths on.
+    /// Quads of samples of a profile, which the shader has unrolled: samples -2 quads to 2 quads - 1, so that the
+    /// shorter side still contains all of an upright profile. They contain all of a profile on lines up to 31 degrees
+    /// off an image axis. Beyond that the outermost flanks are excluded, at 45 degrees those from 2.5 widths on.
     pub fn quads(&self) -> i32 {
         let upright = self.half_across.ceil() + 1.0;
         ((0.5 * (self.half_across / 0.86).max(upright)).ceil() as i32).clamp(1, SAMPLES as i32 / 4)
@@ -135,31 +136,31 @@ impl PeakFrame {
         let full_scale = ((1u32 << bits) - 1) as f32;
         let scale = full_scale / 255.0;
         let s0 = p.width_px;
-        // A window whose middle lies between two pixels holds one of them.
+        // A window whose middle lies between two pixels contains at least one of them.
         let radius = if p.along > 0.0 { (2.4 * p.along * s0).max(1.0) } else { 0.0 };
         let pitch = (width.div_ceil(32) * 32) >> px_log2(bits);
-        // Lines across the stripe are image columns, or rows where the laser lies the other way.
+        // Lines across the stripe are image columns, or rows if the laser's direction of depth is closer to the rows.
         let columns = across[1].abs() >= across[0].abs();
         let line_px = s0.floor().max(1.0);
         let lines = (if columns { width } else { height }).div_ceil(line_px as u32);
-        // Differences over nearly three widths: noise and speckle turn the direction least, and a Gaussian has little
-        // left between samples that far apart. Along a stripe that lies as it should there is room for half as much
+        // Over nearly three widths: noise and speckle then turn the direction least, and a Gaussian has little detail
+        // left between samples that far apart. Along a stripe in its expected direction there is room for half as much
         // again.
         let (lattice_across, lattice_along) = ((1.4 * s0).round().max(1.0) as i32, (2.1 * s0).round().max(2.0) as i32);
         let square = (lattice_across, lattice_across);
         let [square_4, square_8] = turn(s0, square, [4.0, 8.0], std::f64::consts::FRAC_PI_4, false);
         let (lattice, [turn_2, turn_4, turn_6, turn_8], flat) = if slanted(across) {
-            // No image axis runs along such a stripe.
+            // Such a stripe runs along neither image axis.
             (square, [0.0, square_4, 0.0, square_8], -2.0)
         } else {
             let (steepest, seen) = flattest(s0, (lattice_along, lattice_across));
             let lattice = if columns { (lattice_along, lattice_across) } else { (lattice_across, lattice_along) };
-            // What is seen as flat may stand three degrees steeper.
+            // A stripe that seems flat may be three degrees steeper.
             (lattice, turn(s0, lattice, [2.0, 4.0, 6.0, 8.0], steepest + 0.05, !columns), (2.0 * seen).cos())
         };
         let read2 = p.read_noise * p.read_noise * scale * scale;
-        // Rows within 0.4 widths are one sample: their spread is known and costs little of sigma. More than two leave
-        // so few samples that their scatter says little of the noise.
+        // Rows within 0.4 widths form one sample: their spread is known and hardly increases sigma. With more than two
+        // rows so few samples would remain that their scatter says little about the noise.
         let rows = (0.4 * s0).floor().clamp(1.0, 2.0);
         PeakFrame {
             width: width as i32,
@@ -171,14 +172,14 @@ impl PeakFrame {
             read2,
             gain: p.gain * scale,
             speckle2: (p.speckle * p.grain).powi(2),
-            // One profile's scatter says nothing of noise whose grains lie over several of its samples.
+            // One profile's scatter does not show noise whose grains extend over several of its samples.
             belief: if p.grain > 1.0 { GRAINED } else { BELIEF },
-            // One line across the stripe needs no fading.
+            // One line across the stripe needs no weights.
             along_factor: if p.along > 0.0 { 1.0 / (radius * radius) } else { 0.0 },
             radius,
             lattice_u: lattice.0,
             lattice_v: lattice.1,
-            // A level that is less sure than a sample of the profile makes the fit look worse than it is.
+            // A background level less certain than a sample of the profile would make the fit look worse than it is.
             stride: (0.7 * s0).round().clamp(1.0, 2.0) as i32,
             steps: p.steps,
             faintest: c.faintest * scale,
@@ -192,10 +193,10 @@ impl PeakFrame {
             columns: u32::from(columns),
             entries: lines * shots,
             line_px: line_px as u32,
-            // Groups start at multiples of four, so that the window is up to two pixels off: five sixths of it, which
-            // hold 99 % of the weight, shall be there on the shorter side as well.
+            // Groups start at multiples of four, so that the window is up to two pixels off the skeleton pixel. Five
+            // sixths of it, which hold 99 % of the weight, must be present on the shorter side as well.
             fours: if radius >= 4.0 { (0.415 * radius + 1.5) as i32 } else { 0 },
-            // The fit looks at three widths; the skeleton is a pixel beside the centre.
+            // The fit uses three widths; the skeleton may be one pixel beside the centre.
             half_across: (4.0 * s0).min(3.0 * s0 + 1.0) / rows,
             rows: rows as i32,
             turn_2,

@@ -1,16 +1,15 @@
-//! In: a picture. Out: its grey levels by column and row, whatever its depth.
-//! Frame and unit: px, grey levels.
+//! In: a picture. Out: its grey levels by column and row, for any depth. Frame and unit: px, grey levels.
 
 /// Grey levels of a picture.
 pub(crate) trait Grey: Copy + Sync {
-    /// The level of a pixel in the picture.
+    /// The level of a pixel that lies in the picture.
     fn inside(&self, x: i32, y: i32) -> i32;
-    /// With the border repeated.
+    /// The level of a pixel; beyond the border the border pixel repeats.
     fn whole(&self, x: i32, y: i32) -> i32;
-    /// Four in a row, the first in the picture; what lies beyond its right border is any of its levels.
+    /// Four pixels in a row, the first in the picture. Pixels beyond the right border have any level of the picture.
     fn four(&self, x: i32, y: i32) -> [i32; 4];
 
-    /// With the border repeated.
+    /// As `whole`.
     #[inline(always)]
     fn level(&self, x: i32, y: i32) -> f32 {
         self.whole(x, y) as f32
@@ -32,7 +31,7 @@ impl<G> Place<G> {
     }
 }
 
-/// A picture as it lies in memory: rows from the top, sizes in px.
+/// A picture as it is stored: rows from the top, sizes in px.
 #[derive(Clone, Copy)]
 pub(crate) struct View<'a, T> {
     pub(crate) pixels: &'a [T],
@@ -54,13 +53,13 @@ impl<T: Copy + Sync + Into<i32>> Grey for View<'_, T> {
         let from = (y * self.width + x) as usize;
         match self.pixels.get(from..from + 4) {
             Some(&[a, b, c, d]) => [a, b, c, d].map(Into::into),
-            // The last row's end.
+            // At the end of the last row.
             _ => [0, 1, 2, 3].map(|i| self.whole(x + i, y)),
         }
     }
 }
 
-/// The same picture for places whose surroundings all lie in it.
+/// The same picture for places whose neighbourhood lies in it, so that no border is checked.
 #[derive(Clone, Copy)]
 pub(super) struct Inner<G>(pub G);
 

@@ -1,14 +1,13 @@
-//! In: numbers of eight fits that run side by side. Out: arithmetic on all of them at once, each rounded as if it
-//! were alone.
-//! Frame and unit: none.
+//! In: numbers of eight fits that run side by side. Out: arithmetic on all of them at once, with the rounding of a
+//! single fit. Frame and unit: none.
 
 use std::array::from_fn;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// As many as a vector register of most processors holds; where it holds fewer, two take turns.
+/// As many as a vector register of most processors holds. If it holds fewer, two registers take turns.
 pub(super) const LANES: usize = 8;
 
-/// One number of each fit.
+/// One number for each fit.
 #[derive(Clone, Copy)]
 #[repr(align(32))]
 pub(super) struct Lanes(pub [f32; LANES]);
@@ -28,7 +27,7 @@ impl Lanes {
     pub fn with(self, other: Lanes, f: impl Fn(f32, f32) -> f32) -> Lanes {
         Lanes(from_fn(|i| f(self.0[i], other.0[i])))
     }
-    /// The larger; `other` where this is no number. One instruction, which `f32::max` is not.
+    /// The larger; `other` if this is not a number. One instruction, unlike `f32::max`.
     #[inline(always)]
     pub fn max(self, other: Lanes) -> Lanes {
         self.with(other, |a, b| if a > b { a } else { b })
@@ -45,7 +44,7 @@ impl Lanes {
     pub fn clamp(self, low: Lanes, high: Lanes) -> Lanes {
         self.max(low).min(high)
     }
-    /// This in the lanes that run, `other` in those that have ended.
+    /// `self` in the lanes that still run, `other` in those that have ended.
     #[inline(always)]
     pub fn or(self, runs: &[bool; LANES], other: Lanes) -> Lanes {
         Lanes(from_fn(|i| if runs[i] { self.0[i] } else { other.0[i] }))
@@ -80,9 +79,10 @@ impl Neg for Lanes {
     }
 }
 
-// The digits of the shader.
+// The same digits as in the shader.
 #[allow(clippy::approx_constant)]
-/// e to the power of x from -80 to 80, to 2e-7 of itself: every machine has its own `exp`, this one is the shader's.
+/// e to the power of x from -80 to 80, with a relative error of 2e-7. Every machine has its own `exp`; this one is the
+/// shader's.
 #[inline(always)]
 pub(super) fn exponential(x: Lanes) -> Lanes {
     let t = (x * Lanes::all(std::f32::consts::LOG2_E)).clamp(Lanes::all(-120.0), Lanes::all(120.0));
@@ -91,6 +91,6 @@ pub(super) fn exponential(x: Lanes) -> Lanes {
     let p = Lanes::all(0.009_618_129) + f * (Lanes::all(0.001_333_356) + 0.000_154_035_3 * f);
     let p = Lanes::all(0.240_226_5) + f * (Lanes::all(0.055_504_11) + f * p);
     let p = Lanes::all(1.0) + f * (Lanes::all(0.693_147_2) + f * p);
-    // Whole numbers from -120 to 120, which the exponent's bits hold.
+    // Whole numbers from -120 to 120, which fit into the exponent's bits.
     p.with(whole, |p, whole| p * f32::from_bits(((whole as i32 + 127) as u32) << 23))
 }

@@ -1,6 +1,6 @@
-//! In: a picture with a stripe and its skeleton. Out: the stripe's width, its speckle contrast and the sensor's
-//! noise, from the light itself.
-//! Frame and unit: Gaussian sigma in px; speckle is a ratio. docs/math.md, Stripe peak (6).
+//! In: a picture with a stripe and its skeleton. Out: the stripe's width, its speckle contrast and the sensor's noise,
+//! measured on the light itself. Frame and unit: Gaussian sigma in px; speckle is a ratio. docs/math.md, Stripe peak
+//! (6).
 
 use super::found::Peak;
 use super::grey::{Grey, View};
@@ -13,16 +13,17 @@ use crate::stages::stripe::choose_params::ChooseParams;
 use glam::Vec2;
 use nalgebra::{Matrix3, Vector3};
 
-/// Skeleton pixels looked at, spread over the picture; the median of 400 is good to 6 % of the spread.
+/// Skeleton pixels that are used, spread over the picture. The median of 400 has a standard deviation of 6 % of the
+/// spread.
 const SAMPLES: usize = 400;
-/// Fewer than this many usable peaks say nothing.
+/// Fewer usable peaks than this give no result.
 const FEWEST: usize = 20;
-/// Pairs of pixels that are looked at where grains correlate them, over all windows.
+/// Pairs of pixels over all windows that are used if grains correlate them.
 const PAIRS: usize = 1_000_000;
 
-/// Width, speckle and noise of the stripe in one picture, and the dark pixels' noise as it was assumed; `None` where
-/// there is too little of it. `across` is the unit image direction of depth. Start: half the pixels above half
-/// maximum. Then three rounds of fitting with the medians of the round before.
+/// Width, speckle and noise of the stripe in one picture, and the dark pixels' noise as assumed. `None` if there is too
+/// little of the stripe. `across` is the unit image direction of depth. The first estimate of the width is the number
+/// of pixels above half maximum over 2.355. Three rounds of fits follow, each with the results of the round before.
 pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams, across: Vec2) -> Option<Stripe> {
     let step = (skeleton.len() / SAMPLES).max(1);
     let sample: Vec<(i32, i32)> =
@@ -45,7 +46,7 @@ pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams, across: Vec2) ->
     Some(stripe)
 }
 
-/// One round: what the fits say whose sizes and weights follow from the stripe as it was known `before`.
+/// One round: fits with sizes and weights from the stripe `before`, and what they give.
 fn look<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame, p: &PeakParams, before: Stripe) -> Option<Stripe> {
     let fits = fits(image, sample, s);
     if fits.len() < FEWEST {
@@ -78,14 +79,14 @@ fn look<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame, p: &PeakParams,
     })
 }
 
-/// A peak that can be believed, the skeleton pixel that it was fitted at, and its squared residuals.
+/// A usable peak, the skeleton pixel that it was fitted at, and its squared residuals.
 struct Fit {
     at: (i32, i32),
     peak: Peak,
     sums: Sums,
 }
 
-/// Clipped light hides width and noise, and a spot of one pixel is a hot pixel.
+/// The usable peaks. Clipped light hides width and noise, and a spot of one pixel is a hot pixel.
 fn fits<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame) -> Vec<Fit> {
     let mut pixels = Vec::new();
     let skeleton: Vec<u32> = sample.iter().map(|&(x, y)| x as u32 | (y as u32) << 16).collect();
@@ -95,9 +96,9 @@ fn fits<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame) -> Vec<Fit> {
     peaks.filter_map(|(peak, &at)| Some(Fit { at, sums: residuals(image, at, &peak, s, &mut pixels)?, peak })).collect()
 }
 
-/// Fits whose residuals are noise. Where a stripe falls over an edge two pieces of it lie in one window, and on parts
-/// with many small faces such windows are the greater number: what they leave grows with the light as speckle does. A
-/// quarter shows what is usual.
+/// Fits whose residuals are noise. Where a stripe falls over an edge, two pieces of it lie in one window. On parts with
+/// many small faces such windows are the majority, and their residuals grow with the light as speckle does. The best
+/// quarter shows the usual level.
 fn of_one_surface(mut fits: Vec<Fit>, grain: f32) -> Vec<Fit> {
     fits.sort_by(|a, b| a.sums.misfit().total_cmp(&b.sums.misfit()));
     let usual = fits[fits.len() / 4].sums.misfit();
@@ -108,7 +109,7 @@ fn of_one_surface(mut fits: Vec<Fit>, grain: f32) -> Vec<Fit> {
     fits
 }
 
-/// A pixel that takes part: its weight, its residual, its variance, and the rest.
+/// A pixel of a fit: its weight, its residual, its variance, and its terms of the fit.
 struct Pixel {
     weight: f32,
     residual: f32,
@@ -116,8 +117,8 @@ struct Pixel {
     cell: Cell,
 }
 
-/// The window's pixels, and what the fit's three numbers scatter by: pixel by pixel the share of the noise that is
-/// left is 1 - leverage.
+/// Stores the window's pixels in `all`; returns the covariance of the fit's three parameters. The share of a pixel's
+/// noise that remains in its residual is 1 - leverage.
 fn pixels<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame, all: &mut Vec<Pixel>) -> Option<Matrix3<f32>> {
     let n = (k.normal_u, k.normal_v);
     let m = middle(at, k);
@@ -140,7 +141,7 @@ fn pixels<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame, all: &mut 
     normal.try_inverse()
 }
 
-/// The squared residuals of the window. `pixels` is memory that is used again.
+/// The squared residuals of the window. `all` is reused memory.
 fn residuals<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame, all: &mut Vec<Pixel>) -> Option<Sums> {
     let inverse = pixels(image, at, k, s, all)?;
     let mut sums = Sums::default();
@@ -152,8 +153,8 @@ fn residuals<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame, all: &m
 }
 
 impl Fit {
-    /// The same squared residuals where the speckle has grains, of which a fit takes more; the centre's variance over
-    /// that without them.
+    /// Recomputes the squared residuals for speckle with grains, of which a fit absorbs more. Returns the centre's
+    /// variance over its variance without grains.
     fn with_grains<G: Grey>(&mut self, image: G, s: &PeakFrame, grain: f32, all: &mut Vec<Pixel>) -> Option<f32> {
         let inverse = pixels(image, self.at, &self.peak, s, all)?;
         let stride = grain::stride(grain);
@@ -170,14 +171,14 @@ impl Fit {
     }
 }
 
-/// Offset of a peak's line from its skeleton pixel.
+/// Offset of a peak's line from its skeleton pixel, px across.
 fn middle((x, y): (i32, i32), k: &Peak) -> f32 {
     (k.u - x as f32) * k.normal_u + (k.v - y as f32) * k.normal_v
 }
 
-/// The centres of the columns (or rows) along a peak's line, from its model's, and their variance without the
-/// speckle's. The light fades out of what is added up: at a sharp end each pixel that comes in or leaves would move
-/// the centre.
+/// The centres of the columns (or rows) along a peak's line relative to the model's centre, and their variance without
+/// that of speckle. The weight falls with the distance from the line: with a sharp limit each pixel that enters or
+/// leaves would move the centre.
 fn grains<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame) -> Grains {
     let (n, m) = ((k.normal_u, k.normal_v), middle(at, k));
     let reach = Grains::reach(s.reach_along());
@@ -196,8 +197,9 @@ fn grains<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame) -> Grains 
     Grains::new(&columns.iter().map(|c| (c.1 / c.0, c.2 / (c.0 * c.0))).collect::<Vec<_>>())
 }
 
-/// The pixels that take part: `reach` columns (or rows) along the stripe to both sides, in each those within three
-/// widths of the line. `visit` gets column and row from the skeleton pixel, offset across, offset along, grey level.
+/// Visits the pixels of a window: `reach` columns (or rows) along the stripe to both sides, and in each those within
+/// three widths of the line. `visit` receives column and row from the skeleton pixel, offset across, offset along, grey
+/// level.
 #[inline(always)]
 fn window<G: Grey>(
     image: G,
@@ -208,7 +210,7 @@ fn window<G: Grey>(
     s: &PeakFrame,
     mut visit: impl FnMut([i32; 2], f32, f32, f32),
 ) {
-    // Walk along the image axis that is nearer to the stripe.
+    // Steps follow the image axis that the stripe is closer to.
     let rows = ny >= nx.abs();
     let (na, nb) = if rows { (nx, ny) } else { (ny, nx) };
     let half = 3.0 * s.s0;
@@ -227,7 +229,8 @@ fn window<G: Grey>(
     }
 }
 
-/// Median over the sample of the pixels above half of the local maximum, along the shorter image axis, as a sigma.
+/// Number of pixels above half of the local maximum, along the image axis on which there are fewer, as a sigma: the
+/// median over the sample.
 fn half_maximum(image: &Image, sample: &[(i32, i32)]) -> Option<f32> {
     let (w, h) = (image.width as i32, image.height as i32);
     let at = |x: i32, y: i32| f32::from(image.get(x.clamp(0, w - 1) as u32, y.clamp(0, h - 1) as u32));
@@ -244,8 +247,9 @@ fn half_maximum(image: &Image, sample: &[(i32, i32)]) -> Option<f32> {
     (widths.len() >= FEWEST).then(|| median(widths) / 2.355)
 }
 
-/// Half of the light that was fitted is in peaks narrower than this. Where the sheet runs along an edge, the most
-/// peaks of a shot can be of light that falls over it: narrower than the stripe, and less than all of its light.
+/// The width that separates the fitted light into two halves, of narrower and of wider peaks. If the sheet runs along
+/// an edge, most peaks of a shot can come from light that falls over it. They are narrower than the stripe and have
+/// only part of its light.
 fn width_of_most_light(fits: &[Fit]) -> f32 {
     let mut fits: Vec<(f32, f32)> =
         fits.iter().map(|f| (f.peak.width_px, f.peak.amplitude * f.peak.width_px)).collect();
@@ -273,8 +277,8 @@ mod tests {
     const WIDE: f64 = 3.0;
     const SPECKLE: f64 = 0.08;
 
-    /// A quarter of a picture's stripe lies on a face, the rest of it runs along an edge: nine tenths of the light
-    /// fall over, and what stays is a sliver (half as wide as the stripe, a fifth as bright).
+    /// A quarter of a picture's stripe lies on a face, the rest runs along an edge. There nine tenths of the light fall
+    /// over it, and a sliver remains (half as wide as the stripe, a fifth as bright).
     #[test]
     fn slivers_of_light_along_an_edge_are_not_the_stripe() {
         let mut noise = Noise(7);
@@ -295,8 +299,8 @@ mod tests {
         assert!((f64::from(found.speckle) / SPECKLE - 1.0).abs() < 0.15, "{found:?}");
     }
 
-    /// A stripe that falls over an edge every `face` px, and its middle. Every `print` px it is half as bright, over
-    /// 2 px.
+    /// A stripe that falls over an edge every `face` px, and its skeleton. In every `print` px it is half as bright
+    /// over half of the distance, with transitions of 2 px.
     fn falling(face: u32, print: f64) -> (Image, Vec<u32>) {
         let mut noise = Noise(5);
         let middle = |x: u32| 60.0 + [0.0, 7.0, 3.0, 12.0][(x / face) as usize % 4];
@@ -315,7 +319,7 @@ mod tests {
         (Image::from_u8(width, height, pixels), skeleton)
     }
 
-    /// Half of the windows hold an edge on faces of 30 px, and as many one of the print.
+    /// With faces of 30 px half of the windows contain an edge of a face. As many contain an edge of the print.
     #[test]
     fn edges_are_not_taken_for_speckle() {
         for (face, print) in [(1200, 1e6), (60, 1e6), (30, 1e6), (1200, 60.0), (60, 90.0)] {
@@ -329,7 +333,7 @@ mod tests {
         }
     }
 
-    /// The lower edge of a cylinder across the picture, up to 45 degrees steep, and its middle.
+    /// The lower edge of a cylinder across the picture, up to 45 degrees steep, and its skeleton.
     fn bent(radius: f64, wide: f64, speckle: f64) -> (Image, Vec<u32>) {
         let mut noise = Noise(9);
         let half = (0.7 * radius) as u32;
@@ -349,7 +353,7 @@ mod tests {
         (Image::from_u8(width, height, pixels), skeleton)
     }
 
-    /// A bend moves columns that are far apart alike, as large grains do.
+    /// A bend moves columns that are far apart in the same way, as large grains do.
     #[test]
     fn a_bent_line_has_no_grains() {
         for (radius, wide, speckle) in [400.0, 700.0, 1500.0]

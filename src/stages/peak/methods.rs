@@ -1,6 +1,5 @@
-//! In: a picture, a skeleton pixel, the expected stripe. Out: peaks by centre of gravity, by derivatives, and without
-//! either.
-//! Frame and unit: offsets from the skeleton pixel, px; grey levels.
+//! In: a picture, a skeleton pixel, the expected stripe. Out: peaks by centre of gravity, by derivatives, and the
+//! skeleton pixel itself. Frame and unit: offsets from the skeleton pixel, px; grey levels.
 
 use super::PeakFrame;
 use super::fit::{background, finish, look};
@@ -21,7 +20,7 @@ pub(super) fn centroids<G: Grey>(
     let (m0, _) = profiles.guess(s);
     let near = profiles.span(m0, Lanes::all(3.0 * s.s0));
     let quiet = Lanes::all(s.read2) + s.gain * profiles.base;
-    // In samples.
+    // Unit: samples.
     let z = (m0 - profiles.offset) / profiles.step;
     let none = [Lanes::ZERO; 2];
     let (mut sum, mut moment, mut second, mut noise) = (none, none, none, none);
@@ -58,7 +57,7 @@ pub(super) fn centroids<G: Grey>(
     }
 }
 
-/// Centres by derivatives, each where the centre of gravity is.
+/// Centres by derivatives, each computed at the centre of gravity.
 #[inline(always)]
 pub(super) fn derivatives<G: Grey>(
     places: &[Place<G>],
@@ -74,11 +73,11 @@ pub(super) fn derivatives<G: Grey>(
     }
 }
 
-/// Steger's line point: second-order Taylor expansion of the picture smoothed with a Gaussian of sigma
-/// width / √3 or more, which is where the response to a bar has one maximum (\[steger98\] sec. 2.2).
+/// Steger's line point: a second-order Taylor expansion of the picture smoothed with a Gaussian of sigma width / √3 or
+/// more. From that sigma on the response to a bar has one maximum (\[steger98\] sec. 2.2).
 #[inline(always)]
 fn derivative<G: Grey>(image: G, m0: f32, Seen { at: (x, y), n, base, .. }: Seen, s: &PeakFrame) -> Peak {
-    // The expansion holds within half a pixel: it starts at the pixel nearest to the centre of gravity.
+    // The expansion holds within half a pixel, so it starts at the pixel nearest to the centre of gravity.
     let (dx, dy) = ((m0 * n.0 + 0.5).floor() as i32, (m0 * n.1 + 0.5).floor() as i32);
     let (cx, cy) = (x + dx, y + dy);
     let sigma = (s.s0 / 3f32.sqrt()).max(0.8);
@@ -91,7 +90,7 @@ fn derivative<G: Grey>(image: G, m0: f32, Seen { at: (x, y), n, base, .. }: Seen
             let d = i as f32 * n.0 + j as f32 * n.1;
             let kernel = exponential(Lanes::all(-0.5 * inverse * (i * i + j * j) as f32)).0[0];
             let first = kernel * d * inverse;
-            // Derivatives along the normal only: there the expansion is one-dimensional.
+            // Only derivatives along the normal: the expansion is one-dimensional.
             d1 += first * (level - base);
             d2 += kernel * (d * d * inverse - 1.0) * inverse * (level - base);
             smooth += kernel * (level - base);
@@ -110,11 +109,10 @@ fn derivative<G: Grey>(image: G, m0: f32, Seen { at: (x, y), n, base, .. }: Seen
     finish(centre, n, top.max(1.0), base, width, noise.sqrt() / (-d2).max(1e-6), saturated, s)
 }
 
-/// A pixel's position where nothing says in which part of it the centre lies: the standard deviation of an even
-/// distribution.
+/// Standard deviation of a centre that may lie anywhere in its pixel, px: that of a uniform distribution.
 pub(in crate::stages) const EVEN: f32 = 0.288_675_13;
 
-/// The pixel itself, on a stripe that lies as it should and is as wide as expected.
+/// The skeleton pixel itself, for a stripe of the expected direction and width.
 #[inline(always)]
 pub(super) fn pixel<G: Grey>(place: &Place<G>, s: &PeakFrame) -> Peak {
     let (image, (x, y)) = (place.image, place.at());

@@ -1,6 +1,6 @@
-//! In: a grey picture and its skeleton pixels. Out: one sub-pixel peak per skeleton pixel, with width,
-//! amplitude, background, signal-to-noise and its own standard deviation across the stripe.
-//! Frame and unit: image pixels (an integer is a pixel's centre), grey levels of the picture's depth.
+//! In: a grey picture and its skeleton pixels. Out: one sub-pixel peak per skeleton pixel, with width, amplitude,
+//! background, signal-to-noise ratio and its standard deviation across the stripe. Frame and unit: image pixels (an
+//! integer is a pixel's centre), grey levels of the picture's depth.
 
 pub(in crate::stages) mod across;
 pub(in crate::stages) mod fit;

@@ -1,16 +1,16 @@
-//! In: what a person may choose about peaks. Out: the choice, checked.
-//! Frame and unit: px, grey levels; each field says.
+//! In: the user's settings for peaks. Out: the settings, checked. Frame and unit: px, grey levels; stated at each
+//! field.
 
 use crate::fault::{Fault, Result};
 
-/// How the centre across the stripe is found.
+/// Method for finding the centre across the stripe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Maximum likelihood of a Gaussian profile under shot, read and speckle noise; the best.
+    /// Maximum likelihood of a Gaussian profile under shot, read and speckle noise; the most accurate.
     #[default]
     Gaussian,
-    /// Centre of gravity above the background; fast, pulled by whatever else is in the window.
+    /// Centre of gravity above the background; fast, but biased by any other light in the window.
     Centroid,
     /// Zero of the derivative of the Gaussian-smoothed profile (\[steger98\]).
     Derivative,
@@ -19,25 +19,25 @@ pub enum Method {
 }
 
 impl Method {
-    /// In the order of their numbers.
+    /// All methods in the order of their numbers.
     pub const ALL: [Method; 4] = [Method::Gaussian, Method::Centroid, Method::Derivative, Method::Pixel];
 }
 
-/// Settings of the sub-pixel step. The stripe's width and speckle are properties of laser and lens:
-/// [`super::measure`] takes them from the first shots.
+/// Settings of the sub-pixel step. The stripe's width and speckle are properties of laser and lens: [`super::measure`]
+/// measures them on the first shots.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PeakParams {
     /// How the centre is found.
     pub method: Method,
-    /// Gaussian sigma of the stripe's profile, px, 0.4..=12. All windows follow from it: laser waist, lens blur and
-    /// magnification set it, and it scales with the resolution.
+    /// Gaussian sigma of the stripe's profile, px, 0.4..=12. All windows follow from it. Laser waist, lens blur and
+    /// magnification determine it, and it scales with the resolution.
     pub width_px: f32,
-    /// Speckle contrast of one pixel, 0..=1: standard deviation over mean of coherent light. 0 is a stripe without
-    /// speckle; larger trusts the flanks more and the top less.
+    /// Speckle contrast of one pixel, 0..=1: standard deviation over mean of coherent light. 0 means a stripe without
+    /// speckle; a larger value gives more weight to the flanks and less to the top.
     pub speckle: f32,
-    /// How much more a centre scatters by speckle of large grains than by one of single pixels, 1..=20; measured on
-    /// the first shots.
+    /// Factor by which a centre scatters more with speckle of large grains than with speckle of single pixels, 1..=20;
+    /// measured on the first shots.
     #[serde(skip, default = "one")]
     pub grain: f32,
     /// Read and quantisation noise, 0.1..=20 grey levels of an 8-bit picture.
@@ -67,7 +67,7 @@ impl Default for PeakParams {
 }
 
 impl PeakParams {
-    /// Refuses what is out of its range.
+    /// Refuses values out of their range.
     pub fn check(&self) -> Result<()> {
         for (name, value, low, high) in [
             ("width_px", self.width_px, 0.4, 12.0),
@@ -98,7 +98,7 @@ impl PeakParams {
     }
 }
 
-/// What laser, lens and sensor make of a stripe: constant over a scan.
+/// The stripe as laser, lens and sensor show it: constant over a scan.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stripe {
@@ -106,20 +106,20 @@ pub struct Stripe {
     pub width_px: f32,
     /// Standard deviation over mean of the stripe's light from pixel to pixel.
     pub speckle: f32,
-    /// Sigma of the blur that makes the speckle's grains, px; 0 where each pixel's speckle is its own.
+    /// Sigma of the blur that makes the speckle's grains, px; 0 if the speckle of all pixels is independent.
     #[serde(default)]
     pub grain_px: f32,
-    /// How much more a centre scatters by such speckle than by one of single pixels; 1 where it is one of single
-    /// pixels.
+    /// Factor by which a centre scatters more with such speckle than with speckle of single pixels; 1 if it is of
+    /// single pixels.
     #[serde(default = "one")]
     pub grain_factor: f32,
-    /// Standard deviation of a dark pixel, grey levels of an 8-bit picture; 0 where nothing is known of it.
+    /// Standard deviation of a dark pixel, grey levels of an 8-bit picture; 0 if it is unknown.
     #[serde(default)]
     pub noise: f32,
-    /// Read noise and shot noise as [`PeakParams`] has them; those of the settings where nothing was measured.
+    /// Read noise as in [`PeakParams`]. `None` if it was not measured: the settings apply.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub read_noise: Option<f32>,
-    /// Grey levels (8-bit) per photo-electron, as [`PeakParams::gain`].
+    /// Shot noise, grey levels (8-bit) per photo-electron, as [`PeakParams::gain`]. `None` if it was not measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain: Option<f32>,
 }
@@ -142,5 +142,5 @@ impl Default for Stripe {
     }
 }
 
-/// Most samples of a profile, as many as the shader has written out.
+/// Most samples of a profile: as many as the shader has unrolled.
 pub(super) const SAMPLES: usize = 40;

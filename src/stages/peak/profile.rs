@@ -1,6 +1,6 @@
-//! In: pictures, skeleton pixels, the directions across the stripe. Out: the stripe's profiles there, averaged along
-//! it, side by side.
-//! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (2).
+//! In: pictures, skeleton pixels, the directions across the stripe. Out: the stripe's profiles at these pixels,
+//! averaged along it, side by side. Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md,
+//! Stripe peak (2).
 
 use super::PeakFrame;
 use super::grey::Grey;
@@ -10,21 +10,21 @@ use super::params::SAMPLES;
 /// Weights along the stripe are whole numbers up to this: sums are then exact.
 const WEIGHT: f32 = 127.0;
 
-/// The stripe's light over the offset across, one profile a lane, which know nothing of each other: sample k at
-/// `offset + k step`, k = -half..half. Pixels beside each other along the stripe are added up along an image axis, a
-/// wide stripe's columns in groups of four, each shifted by whole pixels to follow the line; what the shifts leave,
-/// and the rows of a sample, widens the profile by `blur2`, which is known.
+/// The stripe's light over the offset across it: one profile in each lane, independent of the others. Sample k lies at
+/// `offset + k step`, k = -half..half. Neighbouring pixels along the stripe are added up along an image axis, a wide
+/// stripe's columns in groups of four, each shifted by whole pixels to follow the line. The remaining offsets, and the
+/// rows of a sample, widen the profile by `blur2`, which is known.
 pub(super) struct Profiles {
-    /// Grey levels, from the middle to both sides, as the shader walks: k = 0, 1, .. and k = -1, -2, ..
+    /// Grey levels from the middle to both sides, in the shader's order: k = 0, 1, .. and k = -1, -2, ..
     pub levels: [[Lanes; SAMPLES / 2]; 2],
-    /// Shares of the weights of saturated pixels.
+    /// Shares of the samples' weights that belong to saturated pixels.
     pub clipped: [[Lanes; SAMPLES / 2]; 2],
-    /// Offsets of the samples from where they should be, and by how much more than `blur2` their pixels scatter about
-    /// that place.
+    /// Offsets of the samples from their nominal places, and by how much the variance of their pixels about that place
+    /// exceeds `blur2`.
     pub off: [[Lanes; SAMPLES / 2]; 2],
     pub more: [[Lanes; SAMPLES / 2]; 2],
     pub half: usize,
-    /// First and last sample that lies in the picture.
+    /// First and last sample that lie in the picture.
     low: Lanes,
     high: Lanes,
     pub offset: Lanes,
@@ -34,33 +34,34 @@ pub(super) struct Profiles {
     pub square: Lanes,
     /// Variance of the pixels' offsets within a sample, px^2.
     pub blur2: Lanes,
-    /// Level beside the stripe, and the square of what it differs by from side to side.
+    /// Level beside the stripe, and the squared difference of the levels on its two sides, beyond their noise.
     pub base: Lanes,
     pub uneven2: Lanes,
-    /// Kept from one profile to the next.
+    /// Memory reused from one profile to the next.
     columns: Vec<Column>,
 }
 
-/// What is known of a place before its profile is fitted.
+/// Properties of a place that are known before its profile is fitted.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Seen {
-    /// The pixel that offsets are counted from.
+    /// The pixel from which offsets are counted.
     pub at: (i32, i32),
     /// Unit vector across the stripe.
     pub n: (f32, f32),
     /// Level beside the stripe.
     pub base: f32,
-    /// Square of what it differs by from side to side.
+    /// Squared difference of the levels on the stripe's two sides, beyond their noise.
     pub uneven2: f32,
 }
 
-/// Columns where the stripe is nearer to the horizontal, else rows; at 45 degrees rounding shall not decide.
+/// True (columns) if the stripe is closer to the horizontal, else rows. The factor keeps rounding from deciding at 45
+/// degrees.
 pub(super) fn by_columns((nx, ny): (f32, f32)) -> bool {
     1.001 * ny >= nx.abs()
 }
 
-/// A window that would move by less than this from row to row, px, stands still: its flanks are then of places up to a
-/// sixth of a width beside its middle, and all its samples have the same columns.
+/// A window that would move by less than this from row to row, px, does not move. Its flanks then come from places up
+/// to a sixth of a width beside its middle, and all its samples have the same columns.
 pub(in crate::stages) const STILL: f32 = 0.05;
 
 /// Shift of the middle of a window along the stripe from one row to the next, px along a.
@@ -70,8 +71,8 @@ fn lean(na: f32, nb: f32) -> f32 {
     if lean.abs() < STILL { 0.0 } else { lean }
 }
 
-/// Where a centre lies in the picture that is `m` px across from a pixel: in the middle of the window there. It is on
-/// the line, however the direction errs.
+/// Place in the picture of a centre that is `m` px across from a pixel: the middle of the window there. It is on the
+/// line even if the direction has an error.
 #[inline(always)]
 pub(super) fn centre_at((x, y): (i32, i32), n: (f32, f32), m: f32) -> (f32, f32) {
     let columns = by_columns(n);
@@ -82,38 +83,39 @@ pub(super) fn centre_at((x, y): (i32, i32), n: (f32, f32), m: f32) -> (f32, f32)
     (x as f32 + du, y as f32 + dv)
 }
 
-/// How far a window may reach to both sides along a: no farther than the picture on one of them, as an error of the
-/// direction would move the centre of a window that reaches farther to one side; and no farther than the columns that
-/// follow the line lie in the picture in the skeleton pixel's sample, without which a profile has no crest. At whole
-/// numbers rounding shall not decide.
+/// How far a window may reach to both sides along a. It reaches no farther than the picture does on either side,
+/// because an error of the direction would move the centre of an asymmetric window. It also reaches no farther than the
+/// shifted columns of the skeleton pixel's own sample lie in the picture, because a profile without that sample has no
+/// crest. The 0.03 keeps rounding from deciding at whole numbers.
 #[inline(always)]
 fn room((a0, b0): (i32, i32), (na, nb): (f32, f32), (width, height): (i32, i32)) -> i32 {
     let across = b0.min(height - 1 - b0) as f32 * nb.abs() / na.abs().max(1e-6);
     a0.min(width - 1 - a0).min((across.min(8192.0) + 0.03).floor() as i32)
 }
 
-/// Number of sample j of a side.
+/// Number k of sample j of a side.
 #[inline(always)]
 pub(super) fn number(side: usize, j: usize) -> f32 {
     if side == 0 { j as f32 } else { -1.0 - j as f32 }
 }
 
-/// How much of sample k lies in a span: a sample that were in or out would hang on the last bit of the span's ends.
+/// Share of sample k that lies in a span. If a sample were either in or out, the last bit of the span's ends would
+/// decide.
 #[inline(always)]
 pub(super) fn share(k: f32, (from, to): (Lanes, Lanes)) -> Lanes {
     let k = Lanes::all(k);
     ((k - from).min(to - k) + Lanes::all(0.5)).clamp(Lanes::ZERO, Lanes::all(1.0))
 }
 
-/// The share of clipped pixels in a sample of which `inside` takes part; 0 in one of which nothing does.
+/// The share of clipped pixels in a sample of which the share `inside` takes part; 0 if no part of it does.
 #[inline(always)]
 pub(super) fn clipped_within(lost: Lanes, inside: Lanes) -> Lanes {
     lost.with(inside, |lost, inside| if inside > 0.0 { lost } else { 0.0 })
 }
 
-/// The window of a profile: a counts along the image axis that the stripe is nearer to, b across it. It is a rectangle
-/// along the stripe: on a slanted stripe its middle moves along a from row to row. Windows of whole columns have flanks
-/// of other places of the stripe, and at edges of another surface.
+/// The window of a profile: a counts along the image axis that the stripe is closer to, b across it. The window is a
+/// rectangle along the stripe: on a slanted stripe its middle moves along a from row to row. Windows of whole columns
+/// would have flanks from other places of the stripe, and at edges from another surface.
 struct Window {
     columns: bool,
     a0: i32,
@@ -121,9 +123,9 @@ struct Window {
     /// The normal along a and b.
     na: f32,
     nb: f32,
-    /// By how much the window's middle moves along a from row to row.
+    /// Shift of the window's middle along a from row to row.
     lean: f32,
-    /// Pixels to both sides of the middle that may have weight, and how many of them lie in the picture.
+    /// Pixels to both sides of the middle that may have weight, and to how many of them the picture limits the window.
     reach: i32,
     room: i32,
     /// 1 / R^2 along a.
@@ -135,7 +137,7 @@ struct Window {
     full_scale: i32,
 }
 
-/// One column of a window, or four neighbouring ones: offset of the first from the skeleton's pixel, shift along the
+/// One column of a window, or four neighbouring ones: offset of the first from the skeleton pixel, shift along the
 /// line, weights.
 struct Column {
     i: i32,
@@ -150,13 +152,13 @@ struct Gathered {
     clipped: i32,
     weight: i32,
     square: i32,
-    /// Of the offsets across from the sample's nominal one, and of their squares.
+    /// Sums of the offsets across from the sample's nominal one, and of their squares.
     moment: f32,
     second: f32,
 }
 
 impl Gathered {
-    /// A pixel of weight g, e off its sample.
+    /// Adds a pixel of weight g, at offset e from its sample.
     #[inline(always)]
     fn add(&mut self, g: i32, e: f32, level: i32, full_scale: i32) {
         let f = g as f32;
@@ -176,7 +178,7 @@ impl Window {
         let (na, nb) = if columns { (nx, ny) } else { (ny, nx) };
         let (a0, b0, width, height) = if columns { (x, y, s.width, s.height) } else { (y, x, s.height, s.width) };
         let lean = lean(na, nb);
-        // Between two pixels the middle may be half of one off them.
+        // The pixel nearest to the middle may be half a pixel off it.
         let off = (lean.abs() * s.half_across * s.rows as f32).min(0.5);
         Window {
             columns,
@@ -194,14 +196,15 @@ impl Window {
         }
     }
 
-    /// The window's middle in a row, and the pixel there. Not + 0.5: at 45 degrees rounding would decide.
+    /// The window's middle in a row, and the pixel there. Not + 0.5, so that rounding errors do not decide at 45
+    /// degrees.
     #[inline(always)]
     fn middle(&self, row: i32) -> (f32, i32) {
         let middle = row as f32 * self.lean;
         (middle, (middle + 0.47).floor() as i32)
     }
 
-    /// Weight of a pixel i beside the skeleton's, in a row with this middle.
+    /// Weight of the pixel at offset i from the skeleton pixel, in a row with this middle.
     #[inline(always)]
     fn weight(&self, i: i32, (middle, pixel): (f32, i32)) -> i32 {
         let t = i as f32 - middle;
@@ -209,14 +212,14 @@ impl Window {
         if (i - pixel).abs() <= self.room { (WEIGHT * (f * f) + 0.5) as i32 } else { 0 }
     }
 
-    /// Whole pixels by which a group whose middle lies there follows the line. Not + 0.5: at 45 degrees rounding would
-    /// decide.
+    /// Whole pixels by which a group with its middle at `i` is shifted to follow the line. Not + 0.5, so that rounding
+    /// errors do not decide at 45 degrees.
     #[inline(always)]
     fn shift(&self, i: f32) -> i32 {
         (-(i * self.na) / self.nb + 0.47).floor() as i32
     }
 
-    /// Sample k, pixel by pixel along the window.
+    /// Sample k, read pixel by pixel along the window.
     #[inline(always)]
     fn singles<G: Grey>(&self, image: G, k: i32) -> Gathered {
         let mut sums = Gathered::default();
@@ -234,8 +237,8 @@ impl Window {
         sums
     }
 
-    /// The columns of a window that stands still, which are the same for all samples: a wide stripe's four at a time,
-    /// as they lie in memory.
+    /// The columns of a window that does not move, which are the same for all samples. Those of a wide stripe are taken
+    /// four at a time, as they are stored.
     #[inline(always)]
     fn columns(&self, fours: i32, columns: &mut Vec<Column>) {
         columns.clear();
@@ -259,7 +262,7 @@ impl Window {
         }
     }
 
-    /// What all samples of a window that stands still have in common: all but their light.
+    /// The sums that all samples of a window that does not move have in common: all except their light.
     #[inline(always)]
     fn alike(&self, columns: &[Column]) -> Gathered {
         let mut sums = Gathered::default();
@@ -273,7 +276,7 @@ impl Window {
         sums
     }
 
-    /// The light of sample k of a window that stands still: all else is as `alike`.
+    /// Sample k of a window that does not move: its light; all else is as in `alike`.
     #[inline(always)]
     fn still<G: Grey>(&self, image: G, k: i32, fours: bool, columns: &[Column], alike: &Gathered) -> Gathered {
         let (mut levels, mut clipped) = (0, 0);
@@ -301,8 +304,8 @@ impl Window {
         Gathered { levels, clipped, ..*alike }
     }
 
-    /// Whether all pixels of sample k lie in the picture that have weight: those at the window's ends do. Columns that
-    /// share their shift with three others lie as much as one and a half from where it holds.
+    /// Whether all pixels of sample k that have weight lie in the picture. The pixels at the window's ends decide.
+    /// Columns that share their shift with three others lie up to one and a half columns from where the shift is exact.
     #[inline(always)]
     fn holds(&self, k: i32, fours: bool) -> bool {
         let reach = self.reach.min(self.room);
@@ -319,9 +322,8 @@ impl Window {
     }
 }
 
-/// A line through what the samples' pixels are off them on average: pixels that follow a slanted line by whole steps
-/// lie a little nearer to each other, or farther apart, than those steps do. What remains is
-/// [`Profiles::off`].
+/// A line through the average offsets of the samples' pixels. Pixels that follow a slanted line in whole steps lie a
+/// little closer together, or farther apart, than the nominal steps. The remaining offsets are [`Profiles::off`].
 #[derive(Default)]
 struct Off {
     all: f32,
@@ -329,14 +331,14 @@ struct Off {
     kk: f32,
     e: f32,
     ke: f32,
-    /// Of the samples' variance, weight and squared weight.
+    /// Weighted sums of the samples' variance, weight and squared weight.
     blur2: f32,
     weight: f32,
     square: f32,
 }
 
 impl Off {
-    /// Sample k, the less certain of the line the farther it lies from the middle: `near` from 1 to 0.
+    /// Adds sample k; it counts less the farther it lies from the middle: `near` from 1 to 0.
     #[inline(always)]
     fn add(&mut self, k: f32, near: f32, sample: &Gathered) {
         let weight = sample.weight as f32;
@@ -351,7 +353,7 @@ impl Off {
         self.square += near * sample.square as f32;
     }
 
-    /// What samples are off at k = 0, and by how much more from one to the next.
+    /// Offset of the samples at k = 0, and its increase from one sample to the next.
     #[inline(always)]
     fn line(&self) -> (f32, f32) {
         let by = (self.all * self.ke - self.k * self.e) / (self.all * self.kk - self.k * self.k);
@@ -382,7 +384,7 @@ impl Profiles {
         }
     }
 
-    /// Puts the profile at a place into a lane.
+    /// Stores the profile at a place in a lane.
     #[inline(always)]
     pub fn put<G: Grey>(&mut self, lane: usize, image: G, seen: &Seen, s: &PeakFrame) {
         let window = Window::new(seen, s);
@@ -431,15 +433,15 @@ impl Profiles {
         self.uneven2.0[lane] = seen.uneven2;
     }
 
-    /// Where the samples begin and end that lie within `reach` of m, in their numbers; not whole.
+    /// The first and the last number of the samples that lie within `reach` of m; not whole numbers.
     #[inline(always)]
     pub fn span(&self, m: Lanes, reach: Lanes) -> (Lanes, Lanes) {
         let (a, b) = ((m - reach - self.offset) / self.step, (m + reach - self.offset) / self.step);
         (a.min(b).max(self.low - Lanes::all(0.5)), a.max(b).min(self.high + Lanes::all(0.5)))
     }
 
-    /// First guess of offset and amplitude: centre of gravity and sum above the background. A window of 1.5 widths:
-    /// neighbours of the stripe shall not pull.
+    /// First guess of offset and amplitude: centre of gravity and sum above the background. The window is only 1.5
+    /// widths, so that neighbours of the stripe do not bias it.
     #[inline(always)]
     pub fn guess(&self, s: &PeakFrame) -> (Lanes, Lanes) {
         let near = self.span(Lanes::ZERO, Lanes::all(1.5 * s.s0 + 0.5));

@@ -1,50 +1,50 @@
-//! In: stripe profiles side by side, one a lane. Out: the Gaussian of each by maximum likelihood: centre, amplitude,
-//! width, sigma.
-//! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (3) to (5).
+//! In: stripe profiles side by side, one in each lane. Out: the maximum-likelihood Gaussian of each: centre, amplitude,
+//! width, sigma. Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (3) to
+//! (5).
 
 use super::PeakFrame;
 use super::lanes::{LANES, Lanes, exponential};
 use super::profile::{Profiles, clipped_within, number, share};
 
-/// Grey levels that are no light, but whose square is no denormal number: those take a CPU many times as long.
+/// Grey levels that count as no light. Their square must not be a denormal number, with which a CPU is many times
+/// slower.
 pub(in crate::stages) const DARK: f32 = 1e-9;
-/// Share of a number's information that is left at least where another number explains it: what f32 can tell from
-/// nothing.
+/// Least share of a parameter's information that remains if another parameter explains it: the resolution of f32.
 pub(in crate::stages) const LEAST: f32 = 1e-5;
-/// Share of the amplitude that sides of different levels are doubted by at most: what differs more is another
-/// stripe's light, and its side is not believed anyhow.
+/// Largest uncertainty from sides of different levels, as a share of the amplitude. A larger difference comes from
+/// another stripe's light, and the brighter side is not used anyway.
 pub(in crate::stages) const UNEVEN: f32 = 0.06;
-/// Share of the ceiling over which clipped pixels fall silent: at once, and rounding would decide.
+/// Share of the ceiling over which the weight of clipped pixels falls to 0. If it fell at once, rounding would decide.
 pub(in crate::stages) const SOFT: f32 = 0.05;
 const ONE: Lanes = Lanes::all(1.0);
 
-/// One Gaussian a lane.
+/// One Gaussian in each lane.
 pub(super) struct Found {
     pub m: Lanes,
     pub a: Lanes,
-    /// Without the profile's own blur.
+    /// Width without the profile's blur.
     pub width: Lanes,
     /// Standard deviation of the centre.
     pub sigma: Lanes,
-    /// Above 0 where a pixel of the fit is clipped.
+    /// Above 0 if a pixel of the fit is clipped.
     pub clipped: Lanes,
 }
 
-/// Amplitude, centre and width, and what the last step left of the squared residuals.
+/// Amplitude, centre and width, and the squared residuals after the last step.
 #[derive(Clone, Copy)]
 struct Gaussian {
     a: Lanes,
     m: Lanes,
     w: Lanes,
-    /// Variance of the centre as the light alone says it, where a sample is one pixel.
+    /// Variance of the centre from the light alone, for samples of one pixel.
     variance: Lanes,
     squares: Lanes,
-    /// Samples that were heard.
+    /// Number of samples that had weight.
     believed: Lanes,
 }
 
-/// Certainty times model squared times z^0, z^1, .. z^4; certainty times residual times model times z^0, z^1, z^2;
-/// the squared residuals, and the weights that were heard.
+/// Sums over certainty times model squared times z^0, z^1, .. z^4; certainty times residual times model times z^0, z^1,
+/// z^2; the squared residuals; and the weights that counted.
 struct Sums {
     e: [Lanes; 5],
     r: [Lanes; 3],
@@ -52,28 +52,28 @@ struct Sums {
     count: Lanes,
 }
 
-/// Profiles and what stays as it is while they are fitted.
+/// Profiles, and the values that do not change during their fits.
 struct Scoring<'a> {
     profiles: &'a Profiles,
-    /// The samples that take part.
+    /// The span of samples that take part.
     near: (Lanes, Lanes),
-    /// The first guess of the centre; the width that is expected of the profile.
+    /// The first guess of the centre; the expected width of the profile.
     m0: Lanes,
     s0: Lanes,
-    /// Variance of a pixel: `quiet` + `gain` light + `speckle2` light^2. What the level beside the stripe may be off
-    /// by is noise too: on a flank, whose speckle is faint, it would count as light.
+    /// Variance of a pixel: `quiet` + `gain` light + `speckle2` light^2. The uncertainty of the level beside the stripe
+    /// is included as noise: on a flank, whose speckle is faint, it would otherwise count as light.
     quiet: Lanes,
     gain: Lanes,
     speckle2: f32,
-    /// Light at which a pixel is clipped, and one over the span in which clipped ones fall silent.
+    /// Light at which a pixel is clipped, and one over the span in which the weight of clipped pixels falls to 0.
     ceiling: Lanes,
     soft: Lanes,
-    /// A weak belief that the width is the expected one keeps two or three lit pixels solvable.
+    /// A weak prior that the width is the expected one; with it, two or three lit pixels can be solved.
     prior: Lanes,
 }
 
-/// Fisher scoring of amplitude, offset and width in the first `lanes` lanes. Variance of a pixel: read noise + gain ·
-/// level + speckle² · light². A saturated pixel says only "at least this bright".
+/// Fisher scoring of amplitude, offset and width in the first `lanes` lanes. Variance of a pixel: read noise squared +
+/// gain · level + speckle² · light². A saturated pixel means only "at least this bright".
 #[inline(always)]
 pub(super) fn gaussians(profiles: &Profiles, lanes: usize, s: &PeakFrame) -> Found {
     let (m0, a0) = profiles.guess(s);
@@ -101,10 +101,10 @@ pub(super) fn gaussians(profiles: &Profiles, lanes: usize, s: &PeakFrame) -> Fou
         scoring.step(&mut fit, &mut runs);
         step += 1;
     }
-    // A sample is the weighted mean of pixels that err independently: its variance is a pixel's times this.
+    // A sample is the weighted mean of pixels with independent errors: its variance is a pixel's variance times this.
     let share = profiles.square / profiles.weight;
-    // Where the noise is larger than the model says, the centre is less certain by the same factor. Few samples tell
-    // little of it, so where it seems smaller the model counts for as many.
+    // If the noise is larger than the model's, the centre is less certain by the same factor. A few samples show little
+    // of the noise, so if it seems smaller, the model counts for `belief` samples.
     let free = (fit.believed - Lanes::all(3.0)).max(ONE);
     let (chi2, belief) = (fit.squares / share, Lanes::all(s.belief));
     let noise = (chi2 / free).max((belief + chi2) / (belief + free));
@@ -118,19 +118,20 @@ pub(super) fn gaussians(profiles: &Profiles, lanes: usize, s: &PeakFrame) -> Fou
 }
 
 impl Scoring<'_> {
-    /// One step of the lanes that run; those that have arrived run no more.
+    /// One step of the lanes that still run; lanes that have converged stop.
     #[inline(always)]
     fn step(&self, fit: &mut Gaussian, runs: &mut [bool; LANES]) {
         let (m0, s0, prior) = (self.m0, self.s0, self.prior);
         let Gaussian { a, m, w, .. } = *fit;
         let Sums { e, r, chi2, count } = self.sums(a, m, w);
-        // In parts of amplitude, width and width; a prior of nearly nothing keeps darkness solvable.
+        // Steps are relative: in parts of amplitude, width and width. A prior of almost nothing keeps dark profiles
+        // solvable.
         let tiny = Lanes::all(1e-9);
         let (h00, h01, h02, h11, h12) = (e[0] + tiny, e[1], e[2], e[2] + tiny, e[3]);
         let h22 = e[4] + prior * (w * w);
         let (g0, g1, g2) = (r[0], r[1], r[2] + (prior * w) * (s0 - w));
-        // Amplitude, then width are eliminated, the centre comes last: d1 is what the light says of it alone. Where
-        // it says nothing, as of a stripe that is clipped all over, rounding shall not make up a certainty.
+        // Amplitude and then width are eliminated, the centre is last: d1 is the information about the centre alone. If
+        // there is no information, as for a stripe that is clipped everywhere, rounding must not produce a certainty.
         let (l01, l02) = (h01 / h00, h02 / h00);
         let d2 = (h22 - l02 * h02).max(LEAST * h22);
         let s12 = h12 - l02 * h01;
@@ -140,11 +141,11 @@ impl Scoring<'_> {
         let x1 = (g1 - (l01 * g0 + l12 * y2)) / d1;
         let x2 = y2 / d2 - l12 * x1;
         let x0 = g0 / h00 - (l02 * x2 + l01 * x1);
-        // Bounded steps: the model is not linear far from the answer.
+        // Bounded steps: the model is not linear far from the solution.
         let da = (a * x0).clamp(-0.5 * a, a);
         let dm = (w * x1).clamp(-0.7 * s0, 0.7 * s0);
         let dw = (w * x2).clamp(-0.3 * s0, 0.3 * s0);
-        // By what this step lowers the squares: they are wanted where the fit ends.
+        // Decrease of the squares by this step: the squares after the last step are needed.
         let gain = (g0 * (da / a) + g1 * (dm / w)) + g2 * (dw / w);
         let next = Gaussian {
             a: (a + da).max(ONE),
@@ -155,8 +156,8 @@ impl Scoring<'_> {
             believed: count / self.profiles.weight,
         };
         fit.take(&next, runs);
-        // The next step would be a tenth of this one, of few fits a half: far below what noise leaves, and below what
-        // a GPU and a processor may differ by where one of them takes it.
+        // The next step would be a tenth of this one, in few fits a half. That is far below the noise, and below the
+        // difference if only a GPU or only a processor takes the step.
         for (lane, runs) in runs.iter_mut().enumerate() {
             let [da, dm, dw] = [da, dm, dw].map(|d| d.0[lane].abs());
             let s0 = s0.0[lane];
@@ -164,7 +165,7 @@ impl Scoring<'_> {
         }
     }
 
-    /// What the samples say of Gaussians with these amplitudes, centres and widths.
+    /// The sums for Gaussians with these amplitudes, centres and widths.
     #[inline(always)]
     fn sums(&self, a: Lanes, m: Lanes, w: Lanes) -> Sums {
         let inverse = 1.0 / w;
@@ -181,9 +182,9 @@ impl Scoring<'_> {
         }
     }
 
-    /// From the middle to one side, because what has become 0 stays 0. A Gaussian at equal steps: its ratio from
-    /// sample to sample falls by a constant factor. The model is that of a sample which is off the
-    /// others' steps or wider, to second order.
+    /// Sums from the middle to one side, because a model value that has become 0 stays 0. A Gaussian at equal steps:
+    /// its ratio from sample to sample falls by a constant factor. The model of a sample includes, to second order,
+    /// that it lies off its step or is wider.
     #[inline(always)]
     fn side(&self, side: usize, a: Lanes, inverse: Lanes, (mut z, dz): (Lanes, Lanes), fall: Lanes) -> Sums {
         let p = self.profiles;
@@ -196,7 +197,7 @@ impl Scoring<'_> {
         for (j, (((&level, &lost), &off), &more)) in samples.zip(&p.more[side][..p.half]).enumerate() {
             let all = share(number(side, j), self.near) * p.weight;
             let light = level - p.base;
-            // Clipped pixels pull while the model is below them, and are silent above.
+            // A clipped pixel counts while the model is below it, and has no weight above.
             let above = (self.soft * (model - self.ceiling) + Lanes::all(0.5)).clamp(Lanes::ZERO, ONE);
             let heard = (ONE - above * lost).max(Lanes::all(1e-3));
             let there = model * ((ONE - z * (off * inverse)) + (z * z - ONE) * (more * inverse2));
@@ -236,7 +237,7 @@ impl Scoring<'_> {
 }
 
 impl Gaussian {
-    /// The next one where the fit runs.
+    /// Takes over the next values in the lanes that run.
     #[inline(always)]
     fn take(&mut self, next: &Gaussian, runs: &[bool; LANES]) {
         let mine = [&mut self.a, &mut self.m, &mut self.w, &mut self.variance, &mut self.squares, &mut self.believed];

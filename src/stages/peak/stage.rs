@@ -1,6 +1,5 @@
-//! In: the bindings of the peak stage as words. Out: the same bindings with the peaks and the strongest filled in, by
-//! the CPU twin.
-//! Frame and unit: words; peaks in pixels and grey levels.
+//! In: the bindings of the peak stage as words. Out: the same bindings with the peaks and the strongest amplitudes,
+//! from the CPU twin. Frame and unit: words; peaks in pixels and grey levels.
 
 use super::found::Peak;
 use super::frame;
@@ -17,16 +16,16 @@ use crate::stages::listing;
 use crate::stages::stripe::choose;
 use rayon::prelude::*;
 
-/// Selects the method when the pipeline is built: 0 Gaussian, 1 centroid, 2 derivative.
+/// Selects the method when the pipeline is built: 0 Gaussian, 1 centroid, 2 derivative, 3 the skeleton pixel.
 pub const METHOD: &str = "peak_method";
 
-/// Quads of samples of a profile, written out when the pipeline is built: [`super::PeakFrame::quads`].
+/// Quads of samples of a profile, a constant of the pipeline: [`super::PeakFrame::quads`].
 pub const QUADS: &str = "quads";
 
 const DIRECTION: &str = include_str!("../../../shaders/shared/direction.wgsl");
 const PROFILE: &str = include_str!("../../../shaders/shared/profile.wgsl");
 
-/// One peak a skeleton pixel, and the strongest of each line across the stripe; one invocation a pixel.
+/// One peak for each skeleton pixel, and the strongest of each line across the stripe; one invocation per pixel.
 pub const STAGE: Stage = Stage {
     name: "peak",
     wgsl: include_str!("../../../shaders/peak.wgsl"),
@@ -109,11 +108,11 @@ pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     peaks[..words.len()].copy_from_slice(words);
 }
 
-/// Largest difference of two lists of peaks, in units of what is allowed for each number: position 0.01 px or a
-/// hundredth of its own sigma (what the light does not determine, rounding decides), width 1 %, stated sigma 2 %,
-/// amplitude and background 0.5 % or a hundredth of a grey level, the strongest amplitudes alike; everything else
-/// exact. Where a number is so near to a limit that only one of the two is refused, each has to have the reason that
-/// its own number gives.
+/// Largest difference of two lists of peaks, in units of the limit for each number. The limit for a position is 0.01 px
+/// or a hundredth of its sigma, because rounding decides what the light does not determine. The other limits are: width
+/// 1 %, stated sigma 2 %, amplitude, background and strongest amplitudes 0.5 % or a hundredth of a grey level.
+/// Everything else must be equal. If a number is so close to a limit that only one of the two peaks is rejected, each
+/// must have the reason that its own numbers give.
 pub fn apart(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
     let frame = frame_of(gpu);
     let (a, b): (&[Peak], &[Peak]) = (bytemuck::cast_slice(&gpu[4]), bytemuck::cast_slice(&twin[4]));
@@ -129,7 +128,7 @@ pub fn apart(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
     a.iter().zip(b).fold(tops, |worst, (a, b)| {
         let flags = a.flags == b.flags || (a.flags >> 8 == b.flags >> 8 && judged(a) && judged(b));
         let same = flags && a.pixel == b.pixel && a.shot == b.shot;
-        // A centre that is uncertain by a pixel is refused; where a fit without an answer stops, rounding decides.
+        // A centre with a sigma of a pixel is rejected; rounding decides where a fit without a solution stops.
         if same && a.sigma_px.min(b.sigma_px) >= 1.0 {
             return worst;
         }

@@ -1,5 +1,4 @@
-//! In: a picture, its skeleton. Out: the peaks, by the arithmetic of peak.wgsl.
-//! Frame and unit: px, grey levels.
+//! In: a picture, its skeleton. Out: the peaks, with the arithmetic of peak.wgsl. Frame and unit: px, grey levels.
 
 use super::found::Peak;
 use super::frame::PeakFrame;
@@ -22,7 +21,7 @@ pub fn peaks(image: &Image, skeleton: &[u32], shot: u32, p: &PeakParams, across:
     fitted(image, skeleton, shot, &frame, p.method)
 }
 
-/// The same with the sizes worked out before.
+/// The same with a frame that was computed before.
 pub fn fitted(image: &Image, skeleton: &[u32], shot: u32, frame: &PeakFrame, method: Method) -> Vec<Peak> {
     let (width, height) = (frame.width, frame.height);
     let some = |pixels: &[u32]| match &image.pixels {
@@ -32,10 +31,10 @@ pub fn fitted(image: &Image, skeleton: &[u32], shot: u32, frame: &PeakFrame, met
     skeleton.par_chunks(TOGETHER).flat_map_iter(some).collect()
 }
 
-/// Skeleton pixels that a thread takes at least: few enough that threads end together on a small picture's stripe.
+/// Least number of skeleton pixels for a thread: few enough that all threads finish together on a small picture.
 pub const TOGETHER: usize = 64;
 
-/// Compiled for what processors can do; none of it rounds otherwise.
+/// Compiled for several instruction sets; all of them round in the same way.
 #[multiversion(targets = "simd")]
 pub fn each<G: Grey>(image: G, pixels: &[u32], shot: u32, frame: &PeakFrame, method: Method) -> Vec<Peak> {
     let mut peaks = Vec::with_capacity(pixels.len());
@@ -48,7 +47,7 @@ pub fn each<G: Grey>(image: G, pixels: &[u32], shot: u32, frame: &PeakFrame, met
     peaks
 }
 
-/// The peaks of up to [`LANES`] places, in their order; `profiles` is memory that is used again.
+/// The peaks of up to [`LANES`] places, in their order; `profiles` is reused memory.
 #[inline(always)]
 pub(super) fn measured<G: Grey>(
     places: &[Place<G>],
@@ -70,9 +69,8 @@ mod tests {
     use super::*;
     use crate::stages::cases::stripe;
 
-    /// What lies in the lanes beside a profile, and what lay there before, is nothing to it: places all over a
-    /// stripe, at the picture's borders too, wide and narrow ones, each alone and with its seven neighbours of the
-    /// list.
+    /// Neither the profiles in neighbouring lanes nor earlier ones influence a profile. Tried with places all over a
+    /// stripe, also at the picture's borders, wide and narrow, each alone and with its seven neighbours in the list.
     #[test]
     fn a_profile_among_others_comes_to_the_bits_that_it_comes_to_alone() {
         for (width, method) in [0.8, 2.5, 7.0].into_iter().flat_map(|w| Method::ALL.map(|m| (w, m))) {

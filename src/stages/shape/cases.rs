@@ -1,11 +1,10 @@
-//! In: nothing. Out: the cases of the stages of shape matching.
-//! Frame and unit: words.
+//! In: nothing. Out: the cases of the stages of shape matching. Frame and unit: words.
 
 use super::frame::*;
 use crate::stages::entry::Case;
 use crate::stages::noise::Noise;
 
-/// Slopes of a made-up level: two squares, noise below the threshold, a corner without slopes.
+/// Slopes of a synthetic level: two squares, noise below the threshold, a corner without slopes.
 fn slopes(frame: &ShapeFrame, seed: u64) -> Vec<u32> {
     let mut noise = Noise(seed);
     let (w, h) = (frame.width as i32, frame.height as i32);
@@ -24,7 +23,7 @@ fn slopes(frame: &ShapeFrame, seed: u64) -> Vec<u32> {
             let grain = |n: &mut Noise| (n.next() % 61) as i32 - 30;
             let strong = around(w / 3, h / 2, h / 4).or(around(2 * w / 3, h / 3, h / 6));
             let (gx, gy) = strong.unwrap_or_else(|| (grain(&mut noise), grain(&mut noise)));
-            // Now and then any direction at any strength.
+            // In one of eleven cells any direction with any strength.
             let (gx, gy) = if noise.next().is_multiple_of(11) {
                 ((noise.next() % 16383) as i32 - 8191, (noise.next() % 16383) as i32 - 8191)
             } else {
@@ -37,7 +36,7 @@ fn slopes(frame: &ShapeFrame, seed: u64) -> Vec<u32> {
     out
 }
 
-/// Cases of one stage: the stages before it are walked by their twins.
+/// Cases of one stage; the stages before it are run by their twins.
 pub fn cases(stage: &str) -> Vec<Case> {
     let mut out = Vec::new();
     for (seed, (w, h, margin, ignore)) in

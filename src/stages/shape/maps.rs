@@ -1,12 +1,12 @@
-//! In: slopes of a pyramid level in whole numbers. Out: directions, and how well every strided place meets each of 16
-//! of them, as WGSL stages with their CPU twins (docs/math.md, Shape matching, coarse search).
-//! Frame and unit: cells of the level, x right, y down; slopes in 1 / 64 of the threshold; responses 0 to 4.
+//! In: slopes of a pyramid level in whole numbers. Out: directions, and how well every strided place matches each of 16
+//! directions, as WGSL stages with their CPU twins (docs/math.md, Shape matching, coarse search). Frame and unit: cells
+//! of the level, x right, y down; slopes in 1 / 64 of the threshold; responses 0 to 4.
 
 use super::frame::{BINS, SHARED, STRIDE, ShapeFrame, UNIFORM};
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Stage};
 
-/// The direction of each cell's slope as one bit of 16; one invocation a cell.
+/// The direction of each cell's slope as one of 16 bits; one invocation per cell.
 pub const QUANTISE: Stage = Stage {
     name: "shape_quantise",
     wgsl: include_str!("../../../shaders/shape_quantise.wgsl"),
@@ -21,7 +21,7 @@ pub const QUANTISE: Stage = Stage {
     overrides: &[],
 };
 
-/// How well each strided place meets each direction; one invocation for four places of one phase.
+/// How well each strided place matches each direction; one invocation for four places of one phase.
 pub const SPREAD: Stage = Stage {
     name: "shape_spread",
     wgsl: include_str!("../../../shaders/shape_spread.wgsl"),
@@ -36,21 +36,22 @@ pub const SPREAD: Stage = Stage {
     overrides: &[],
 };
 
-/// Largest component of a packed slope: its square and its product with a tangent stay below 2^31.
+/// Largest component of a packed slope; with it, squares and products with a tangent stay below 2^31.
 const LARGEST: i32 = 8191;
 /// The threshold in packed slopes.
 const UNIT: f32 = 64.0;
-/// tan(11.25 degrees) and tan(33.75 degrees) in 1 / 65536: the borders of the directions in an octant.
+/// tan(11.25 degrees) and tan(33.75 degrees) in units of 1 / 65536: they separate the directions in an octant.
 const TAN_11: i32 = 13036;
 const TAN_33: i32 = 43790;
 
-/// Two components in one word.
+/// Packs the two components of a slope into one word.
 pub fn packed(gx: i32, gy: i32) -> u32 {
     (gx as u32 & 0xffff) | (gy as u32) << 16
 }
 
-/// A slope as the stages take it: in 1 / 64 of `threshold`, a strong one shortened so that it keeps its direction. The
-/// only floating-point step of the coarse search, taken on the host, so that every machine sees the same numbers.
+/// A slope in the format of the stages: in 1 / 64 of `threshold`; a strong slope is shortened so that it keeps its
+/// direction. This is the only floating-point step of the coarse search. It is done on the host, so that every machine
+/// uses the same numbers.
 pub fn pack(gx: f32, gy: f32, threshold: f32) -> u32 {
     let k = UNIT / threshold.max(f32::MIN_POSITIVE);
     let most = gx.abs().max(gy.abs()) * k;
@@ -73,15 +74,15 @@ pub fn direction(slope: u32) -> u16 {
     1 << if gy < 0 { (16 - half) % 16 } else { half }
 }
 
-/// How well a set of directions meets direction `want`: 4 the same, 3 and 1 for one and two bins off.
+/// How well a set of directions matches direction `want`: 4 for the same direction, 3 and 1 for one and two bins off.
 pub fn response(bits: u16, want: usize) -> u8 {
-    // Without branches, so that a row of sets is answered at once.
+    // Without branches, so that a row of sets can be processed in parallel.
     let bits = bits.rotate_right(want as u32);
     let near = |mask: u16, score: u8| if bits & mask != 0 { score } else { 0 };
     near(1, 4).max(near(1 << 1 | 1 << 15, 3)).max(near(1 << 2 | 1 << 14, 1))
 }
 
-/// Both polarities of a set of directions.
+/// The set of directions with the opposite of each added.
 pub fn both_polarities(bits: u16) -> u16 {
     bits | bits.rotate_left(8)
 }
@@ -128,7 +129,7 @@ mod tests {
             let a = (f64::from(k) + 0.5) * std::f64::consts::TAU / 3600.0;
             let bin = (a / std::f64::consts::TAU * 16.0).round() as usize % 16;
             let border = (a / std::f64::consts::TAU * 16.0).fract() - 0.5;
-            // At 100 thresholds a component is told to 1 / 6400.
+            // At 100 thresholds a component is known to 1 / 6400.
             if border.abs() > 1e-3 {
                 let slope = pack(100.0 * a.cos() as f32, 100.0 * a.sin() as f32, 1.0);
                 assert_eq!(direction(slope), 1 << bin, "at {a}");

@@ -1,5 +1,5 @@
-//! In: slopes of a picture, a model's features. Out: the stages that score the model at every turn and place.
-//! Frame and unit: strided places of a pyramid level; a perfect feature scores 4.
+//! In: slopes of a picture, a model's features. Out: the stages that score the model at every turn and place. Frame and
+//! unit: strided places of a pyramid level; a perfect feature scores 4.
 
 pub mod cases;
 pub mod frame;

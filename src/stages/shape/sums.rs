@@ -1,6 +1,6 @@
 //! In: responses of a level and the features of a model at many turns. Out: sums at every strided place and their
-//! peaks, as WGSL stages with their CPU twins (docs/math.md, Shape matching, coarse search).
-//! Frame and unit: strided places; a perfect feature scores 4.
+//! peaks, as WGSL stages with their CPU twins (docs/math.md, Shape matching, coarse search). Frame and unit: strided
+//! places; a perfect feature scores 4.
 
 use super::frame::{SHARED, ShapeFrame, UNIFORM};
 use crate::gpu::Access::*;
@@ -23,7 +23,8 @@ pub const SCORE: Stage = Stage {
     overrides: &[],
 };
 
-/// The places whose sum is large enough and that no neighbour exceeds; one invocation for four places of one turn.
+/// The places with a sum of at least the least sum that no neighbour exceeds; one invocation for four places of one
+/// turn.
 pub const PEAKS: Stage = Stage {
     name: "shape_peaks",
     wgsl: include_str!("../../../shaders/shape_peaks.wgsl"),
@@ -44,16 +45,16 @@ pub const PEAKS: Stage = Stage {
 pub struct Peak {
     /// Number of the turn within the run.
     pub turn: u32,
-    /// Strided place from the top, border included.
+    /// Strided place from the top, including the border.
     pub row: u32,
-    /// Strided place from the left, border included.
+    /// Strided place from the left, including the border.
     pub column: u32,
     /// Sum over the features, each 0..=4.
     pub sum: u32,
 }
 
 impl Peak {
-    /// Out of the two words of the list: turn | sum << 24, column | row << 16.
+    /// A peak from the two words of the list: turn | sum << 24, column | row << 16.
     pub fn unpack([a, b]: [u32; 2]) -> Peak {
         Peak { turn: a & 0xff_ffff, sum: a >> 24, column: b & 0xffff, row: b >> 16 }
     }
@@ -62,7 +63,7 @@ impl Peak {
     }
 }
 
-/// The peaks of one turn's sums, `stride` bytes a row of which `columns` count.
+/// The peaks of one turn's sums, with `stride` bytes in a row, of which `columns` are used.
 pub fn peaks(sums: &[u8], stride: usize, columns: usize, rows: usize, least: u8, turn: u32) -> Vec<Peak> {
     let mut found = Vec::new();
     for y in 0..rows {
@@ -117,7 +118,7 @@ pub(crate) fn peaks_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-/// Number of words that differ, the hits being a list in any order.
+/// Number of words that differ; the order of the hits does not count.
 pub fn differing_hits(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
     let sorted = |b: &[Vec<u32>]| {
         let mut b = b.to_vec();

@@ -1,5 +1,5 @@
-//! In: pictures, one picture of the ambient light. Out: the pictures without it.
-//! Frame and unit: grey levels; a saturated pixel stays saturated.
+//! In: pictures, one picture of the ambient light. Out: the pictures minus the ambient light. Frame and unit: grey
+//! levels; a saturated pixel stays saturated.
 
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Stage};
@@ -9,7 +9,7 @@ use crate::stages::frame::{Frame, PX_LOG2, SHARED, frame_of};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
-/// Subtracts the ambient light where the pictures lie; one invocation for 4 words of one shot.
+/// Subtracts the ambient light from the pictures in place; one invocation for 4 words of one shot.
 pub const STAGE: Stage = Stage {
     name: "ambient",
     wgsl: include_str!("../../../shaders/ambient.wgsl"),
@@ -24,7 +24,7 @@ pub const STAGE: Stage = Stage {
     overrides: &[PX_LOG2],
 };
 
-/// Subtracts the ambient light from the pictures where they lie.
+/// Subtracts the ambient light from the pictures in place.
 pub const STEP: Step =
     Step { stage: &STAGE, twin, binds: &["frame", "image", "ambient"], groups: Groups::Of(groups), same: Same::Words };
 
@@ -33,12 +33,12 @@ pub fn groups(f: &Frame) -> [u32; 3] {
     STAGE.groups([f.shot_words / 4, f.shots, 1])
 }
 
-/// What is left of a pixel: never below 0, and a saturated one stays, its true value is not known.
+/// A pixel minus the ambient light, never below 0. A saturated pixel stays, because its true value is unknown.
 pub fn subtract(value: u32, ambient: u32, full_scale: u32) -> u32 {
     if value >= full_scale { value } else { value.saturating_sub(ambient) }
 }
 
-/// A picture without the ambient light; both of one size and depth.
+/// A picture minus the ambient light; both have the same size and depth.
 pub fn without(image: &Image, ambient: &Image) -> Image {
     let full = image.full_scale();
     let left = |(s, a): (&u16, &u16)| if *s >= full { *s } else { s.saturating_sub(*a) };

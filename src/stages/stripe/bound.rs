@@ -1,11 +1,11 @@
-//! In: block statistics. Out: how small the sum of a window around any pixel of a block can be at least.
-//! Frame and unit: blocks of 16 x 8 pixels, 256ths of full scale.
+//! In: block statistics. Out: a lower bound on the sum of any window around a pixel of a block. Frame and unit: blocks
+//! of 16 x 8 pixels, 256ths of full scale.
 
 use super::stats::Block;
 use crate::stages::frame::Frame;
 
-/// How the windows of all pixels of a block lie over blocks of `edge` pixels, along one axis: blocks up to `full` away
-/// are covered whole, `rest` pixels more lie in the blocks beyond them up to `reach` away.
+/// How the windows of all pixels of a block cover blocks of `edge` pixels, along one axis. Blocks up to `full` away are
+/// covered whole. `rest` more pixels lie in the blocks beyond them, up to `reach` away.
 #[derive(Clone, Copy, Debug)]
 struct Cover {
     full: i32,
@@ -32,12 +32,12 @@ impl Cover {
     }
 }
 
-/// What a column of blocks gives to the windows of all pixels of one of its blocks.
+/// Contribution of a column of blocks to the windows of all pixels of one of its blocks.
 #[derive(Clone, Copy, Debug)]
 struct Band {
     /// Least sum of the windows' rows over the block's width.
     sum: u32,
-    /// Least sum over one column of pixels of the rows that all windows cover.
+    /// Least sum over one column of pixels, of the rows that all windows cover.
     column: u32,
     /// Smallest pixel, and half the smallest quad, of the blocks that windows cover in part.
     smallest: u32,
@@ -55,20 +55,20 @@ pub struct Blocks<'a> {
 }
 
 impl<'a> Blocks<'a> {
-    /// `stats` as [`crate::stages::stripe::stats`] leaves them: two words a block, shot by shot.
+    /// `stats` has the format of [`crate::stages::stripe::stats`]: two words per block, shot by shot.
     pub fn new(f: &Frame, stats: &'a [u32], shot: u32) -> Blocks<'a> {
         let per_shot = (4 * f.tiles_x * f.tiles_y) as usize;
         let words = &stats[shot as usize * per_shot..][..per_shot];
         Blocks { words, columns: 2 * f.tiles_x as i32, rows: f.tiles_y as i32, size: f.size }
     }
 
-    /// The block in column `x`, row `y` of blocks; beyond the picture the nearest one.
+    /// The block in column `x`, row `y` of blocks; beyond the picture the nearest block.
     pub fn block(&self, x: i32, y: i32) -> Block {
         let near = (x.clamp(0, self.columns - 1), y.clamp(0, self.rows - 1));
         Block::unpack(&self.words[2 * (near.1 * self.columns + near.0) as usize..][..2])
     }
 
-    /// Above and below the picture its border's pixels repeat.
+    /// The block; above and below the picture one that repeats the border's pixels.
     fn repeated(&self, x: i32, y: i32) -> Block {
         let b = self.block(x, y);
         if (0..self.rows).contains(&y) {
@@ -92,16 +92,16 @@ impl<'a> Blocks<'a> {
         if (0..self.columns).contains(&x) {
             return band;
         }
-        // Beyond the border sixteen times its least column, four times its smallest pixel.
+        // Beyond the border the band's smallest column repeats sixteen times, and its smallest pixel four times.
         let sum = 16 * (band.column + cover.rest * band.smallest);
         Band { sum, half_quad: 2 * band.smallest, ..band }
     }
 
-    /// Lower bound on the sum of every window whose centre lies in the block: windows hold the blocks near it whole,
-    /// and of those further away a part.
+    /// Lower bound on the sum of every window whose centre lies in the block. Windows contain the blocks near it whole,
+    /// and a part of those farther away.
     pub fn least_sum(&self, x: i32, y: i32) -> u32 {
         let (across, down) = (Cover::new(self.size, 16), Cover::new(self.size, 8));
-        // What is covered in part in both directions holds, on both sides together, this many whole quads.
+        // The area covered in part in both directions contains this many whole quads, on both sides together.
         let quads = (across.rest - 1) / 2 * ((down.rest - 1) / 2);
         let singles = across.rest * down.rest - 4 * quads;
         let part = |of: fn(Band) -> u32| {
@@ -113,7 +113,7 @@ impl<'a> Blocks<'a> {
             + singles * part(|b| b.smallest)
     }
 
-    /// Smallest pixel of all blocks that a window whose centre lies in the block can touch: bounds any weighted mean.
+    /// Smallest pixel of all blocks that overlap a window with its centre in the block: it bounds any weighted mean.
     pub fn darkest(&self, x: i32, y: i32) -> u32 {
         let (across, down) = (Cover::new(self.size, 16), Cover::new(self.size, 8));
         let near = down.all().flat_map(|dy| across.all().map(move |dx| (dx, dy)));

@@ -1,5 +1,5 @@
-//! In: the peaks of one shot. Out: the same peaks, those not believed marked with the reason. On the GPU the stages
-//! peak and point do it. Frame and unit: image pixels; grey levels of the picture's depth; widths relative to the
+//! In: the peaks of one shot. Out: the same peaks; rejected ones are marked with the reason. On the GPU the stages peak
+//! and point do this. Frame and unit: image pixels; grey levels of the picture's depth; widths relative to the
 //! stripe's.
 
 use super::choose_params::ChooseParams;
@@ -10,12 +10,12 @@ use crate::stages::peak::params::PeakParams;
 use crate::stages::peak::{PeakFrame, SHARED, UNIFORM, frame_of};
 use glam::Vec2;
 
-/// What the step knows about picture, stripe and laser.
+/// The properties of picture, stripe and laser that the tests use.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene {
-    /// Of the picture, px.
+    /// Width of the picture, px.
     pub width: u32,
-    /// Of the picture, px.
+    /// Height of the picture, px.
     pub height: u32,
     /// Grey level of saturation.
     pub full_scale: f32,
@@ -33,7 +33,7 @@ impl Scene {
     }
 }
 
-/// CPU twin, two passes as on the GPU: each peak by itself and the strongest of each line, then those that are
+/// CPU twin, in two passes as on the GPU: first each peak alone and the strongest of each line, then the peaks that are
 /// weak beside another.
 pub fn choose(peaks: &mut [Peak], scene: &Scene, p: &ChooseParams) {
     let frame = scene.frame(p);
@@ -52,8 +52,8 @@ fn line_of(pixel: u32, columns: u32, line_px: u32) -> usize {
     ((if columns != 0 { pixel & 0xffff } else { pixel >> 16 }) / line_px) as usize
 }
 
-/// The tests that need no other peak; who passes them counts among the strongest of the lines of its shot. Amplitudes
-/// are positive, so their bits are in the order of their values.
+/// The tests that need no other peak. A peak that passes them counts for the strongest of its line. Amplitudes are
+/// positive, so their bits have the order of their values.
 pub(in crate::stages) fn alone(k: &mut Peak, f: &PeakFrame, strongest: &mut [u32]) {
     k.refuse(reason(k, f));
     if k.kept() {
@@ -62,7 +62,7 @@ pub(in crate::stages) fn alone(k: &mut Peak, f: &PeakFrame, strongest: &mut [u32
     }
 }
 
-/// What the numbers of a peak say by themselves.
+/// The result of the tests on a peak's own numbers.
 pub(in crate::stages) fn reason(k: &Peak, f: &PeakFrame) -> Reject {
     let across = k.normal_u * f.across_u + k.normal_v * f.across_v;
     if k.amplitude < f.faintest {
@@ -80,27 +80,27 @@ pub(in crate::stages) fn reason(k: &Peak, f: &PeakFrame) -> Reject {
     }
 }
 
-/// The lines across the stripe of a shot, and what a peak needs beside the strongest of those nearby.
+/// The lines across the stripe of a shot, and the limits of a peak relative to the strongest nearby.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lines {
-    /// As in [`PeakFrame`].
+    /// Number of lines, as in [`PeakFrame`].
     pub lines: u32,
-    /// As in [`PeakFrame`]: 1 where the lines are columns, 0 where they are rows.
+    /// As in [`PeakFrame`]: 1 if the lines are columns, 0 if they are rows.
     pub columns: u32,
-    /// As in [`PeakFrame`]: columns or rows of one line, px.
+    /// Columns or rows in a line, px, as in [`PeakFrame`].
     pub line_px: u32,
-    /// Half window of lines.
+    /// Half the window in which the strongest peak is searched, lines.
     pub reach: i32,
     /// Least amplitude over the strongest of those lines, 0..=1.
     pub echo: f32,
-    /// px
+    /// Width below which a peak may be a spot cut by an edge, px.
     pub cut_width: f32,
-    /// Amplitude over the strongest of those lines, 0..=1, that a narrower peak needs.
+    /// Least amplitude of such a narrow peak over the strongest of those lines, 0..=1.
     pub cut_amplitude: f32,
 }
 
 impl Lines {
-    /// The choice in px and lines of the pictures that `f` was made for.
+    /// Converts the settings to px and lines of the pictures of `f`.
     pub fn new(f: &PeakFrame, p: &ChooseParams) -> Lines {
         Lines {
             lines: f.lines,
@@ -114,7 +114,7 @@ impl Lines {
     }
 }
 
-/// The tests against the strongest peak of the lines nearby; `strongest` are those of its shot.
+/// The tests against the strongest peak of the lines nearby; `strongest` has those of the peak's shot.
 pub(in crate::stages) fn beside(k: &mut Peak, strongest: &[u32], l: &Lines) {
     let at = line_of(k.pixel, l.columns, l.line_px);
     let reach = l.reach as usize;
@@ -127,7 +127,7 @@ pub(in crate::stages) fn beside(k: &mut Peak, strongest: &[u32], l: &Lines) {
     }
 }
 
-/// Tells the stages peak and point what [`line_of`] tells their twins.
+/// WGSL of [`line_of`] for the stages peak and point.
 pub(in crate::stages) const LINE_OF: &str = include_str!("../../../shaders/shared/line_of.wgsl");
 
 /// Empties the list of the strongest peaks.
@@ -141,7 +141,7 @@ pub const LINES: Stage = Stage {
     overrides: &[],
 };
 
-/// Workgroups that empty the list.
+/// Workgroups that cover the list.
 pub fn lines_groups(f: &PeakFrame) -> [u32; 3] {
     LINES.groups([f.entries, 1, 1])
 }
@@ -185,7 +185,7 @@ mod tests {
         assert_eq!(reason(peak(12, 20.0, 1.0), &stripe), Reject::Echo);
         assert_eq!(reason(peak(30, 20.0, 1.0), &stripe), Reject::Kept);
         assert_eq!(reason(peak(12, 40.0, 1.0), &stripe), Reject::Kept);
-        // What is refused by itself casts no shadow.
+        // A peak that is rejected alone does not count as the strongest.
         assert_eq!(reason(peak(12, 20.0, 1.0), &[peak(10, 200.0, 0.3)]), Reject::Kept);
     }
 

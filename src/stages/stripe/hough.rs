@@ -1,12 +1,12 @@
-//! In: skeleton pixels. Out: the straight lines among them, voted for in whole numbers and refined on their pixels.
-//! Frame and unit: image pixels; a line is x cos(angle) + y sin(angle) = distance, angle in radians, 0..pi.
+//! In: skeleton pixels. Out: the straight lines among them, found by votes in whole numbers and refined on their
+//! pixels. Frame and unit: image pixels; a line is x cos(angle) + y sin(angle) = distance, angle in radians, 0..pi.
 
 use crate::fault::{Fault, Result};
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Device, Stage, Workload, run_once};
 use crate::stages::listing;
 
-/// Votes of skeleton pixels for the lines through them; one invocation a pixel.
+/// Votes of skeleton pixels for the lines through them; one invocation per pixel.
 pub const STAGE: Stage = Stage {
     name: "hough",
     wgsl: include_str!("../../../shaders/hough.wgsl"),
@@ -23,7 +23,7 @@ pub const STAGE: Stage = Stage {
     overrides: &[],
 };
 
-/// The WGSL struct of the same name.
+/// The WGSL struct of the same name, shaders/hough.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct HoughFrame {
@@ -31,9 +31,9 @@ pub struct HoughFrame {
     pub middle_x: i32,
     /// Half the picture's height, px, rounded down.
     pub middle_y: i32,
-    /// Directions of the line's normal in half a turn, from the x axis on.
+    /// Directions of the line's normal in half a turn, starting at the x axis.
     pub angles: u32,
-    /// Distances an angle has, one px each; the middle one is a line through the picture's middle.
+    /// Number of distances per angle, one px each; the middle one is a line through the picture's middle.
     pub cells: u32,
 }
 
@@ -41,13 +41,13 @@ pub struct HoughFrame {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct HoughParams {
-    /// Angles in half a turn, 45..=1440; more than the longer edge in pixels brings nothing.
+    /// Angles in half a turn, 45..=1440; more than the longer edge in pixels gives no gain.
     pub angles: u32,
-    /// Least pixels of a line, 2..=65535.
+    /// Least number of pixels in a line, 2..=65535.
     pub least_pixels: u32,
-    /// Most lines, 1..=64.
+    /// Largest number of lines, 1..=64.
     pub most: usize,
-    /// Pixels so near to a line belong to it, 0.5..=20 px.
+    /// Distance within which a pixel belongs to a line, 0.5..=20 px.
     pub near_px: f64,
 }
 
@@ -58,7 +58,7 @@ impl Default for HoughParams {
 }
 
 impl HoughParams {
-    /// Refuses what is out of its range.
+    /// Refuses values out of their range.
     pub fn check(&self) -> Result<()> {
         for (name, value, low, high) in [
             ("angles", f64::from(self.angles), 45.0, 1440.0),
@@ -78,20 +78,20 @@ impl HoughParams {
 /// A straight line x cos(angle) + y sin(angle) = distance.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Line {
-    /// Of the normal, from x towards y, rad, 0..pi.
+    /// Angle of the normal, from x towards y, rad, 0..pi.
     pub angle: f64,
-    /// From pixel (0, 0) along the normal, px; negative where the line lies behind it.
+    /// Distance from pixel (0, 0) along the normal, px; negative if the line lies on the other side.
     pub distance_px: f64,
-    /// Pixels that belong to it.
+    /// Number of pixels that belong to it.
     pub pixels: u32,
-    /// Standard deviation of those across the line.
+    /// Standard deviation of those pixels across the line, px.
     pub spread_px: f64,
 }
 
 impl HoughFrame {
-    /// For pictures of `width` x `height` px.
+    /// The layout for pictures of `width` x `height` px.
     pub fn new(width: u32, height: u32, p: &HoughParams) -> HoughFrame {
-        // Farthest pixel from the middle, both signs, and one for rounding.
+        // The farthest pixel from the middle, in both directions, and one cell for rounding.
         let reach = (f64::from(width / 2 + 1).hypot(f64::from(height / 2 + 1))).ceil() as u32 + 1;
         HoughFrame {
             middle_x: (width / 2) as i32,
@@ -100,7 +100,7 @@ impl HoughFrame {
             cells: 2 * reach + 1,
         }
     }
-    /// Cosines and sines in 1 / 16384: whole numbers, so that GPU and CPU vote for the same cell.
+    /// Cosines and sines in units of 1 / 16384: whole numbers, so that GPU and CPU vote for the same cell.
     pub fn table(&self) -> Vec<[i32; 2]> {
         (0..self.angles)
             .map(|k| {
@@ -128,10 +128,10 @@ pub fn votes(frame: &HoughFrame, pixels: &[u32]) -> Vec<u32> {
     votes
 }
 
-/// Bytes of votes in one run; every adapter binds as much.
+/// Largest size of the votes in one run, bytes; every adapter can bind that much.
 const RUN_BYTES: usize = 64 << 20;
 
-/// The votes of each shot's pixels, from the stage on a GPU or from its twin: the same numbers.
+/// The votes of each shot's pixels, from the stage on a GPU or from its twin, which gives the same numbers.
 pub fn vote(device: Option<&Device>, frame: &HoughFrame, shots: &[Vec<u32>]) -> Result<Vec<Vec<u32>>> {
     let Some(device) = device else { return Ok(shots.iter().map(|pixels| votes(frame, pixels)).collect()) };
     let each = (frame.angles * frame.cells) as usize;
@@ -157,14 +157,14 @@ pub fn vote(device: Option<&Device>, frame: &HoughFrame, shots: &[Vec<u32>]) -> 
     Ok(out)
 }
 
-/// Lines of one shot, the one with most votes first. Each is refined by total least squares on the pixels near it,
-/// whose votes then leave, so that no line is found twice. `votes` is what the stage or its twin counted.
+/// Lines of one shot, the one with most votes first. Each is refined by total least squares on the pixels near it. The
+/// votes of these pixels are then removed, so that no line is found twice. `votes` come from the stage or its twin.
 pub fn lines(frame: &HoughFrame, mut votes: Vec<u32>, pixels: &[u32], p: &HoughParams) -> Vec<Line> {
     let table = frame.table();
     let mut left: Vec<u32> = pixels.to_vec();
     let mut found = Vec::new();
     while found.len() < p.most {
-        // The first of equal cells: the answer does not depend on the machine.
+        // The first of several equal cells, so that the result does not depend on the machine.
         let Some((at, &most)) = votes.iter().enumerate().rev().max_by_key(|(_, v)| **v) else { break };
         if most == 0 {
             break;
@@ -174,7 +174,7 @@ pub fn lines(frame: &HoughFrame, mut votes: Vec<u32>, pixels: &[u32], p: &HoughP
             + c * f64::from(frame.middle_x)
             + s * f64::from(frame.middle_y);
         let mut line = (c, s, distance);
-        // A cell is one pixel and half an angle step wide; three fits walk to the pixels' own line.
+        // A cell is one pixel and half an angle step wide; three fits converge to the line of the pixels.
         let mut members = Vec::new();
         let mut fit = None;
         for _ in 0..3 {
@@ -252,7 +252,7 @@ pub(crate) fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
 mod tests {
     use super::*;
 
-    /// Pixels of a straight line as thinning leaves them.
+    /// Pixels of a straight line as they are after thinning.
     fn drawn(angle: f64, distance: f64, width: u32, height: u32) -> Vec<u32> {
         let (s, c) = angle.sin_cos();
         let mut pixels = Vec::new();
@@ -279,7 +279,7 @@ mod tests {
         assert_eq!(found.len(), 2);
         for (angle, distance) in truth {
             let line = found.iter().find(|l| (l.angle - angle).abs() < 0.01).expect("both lines");
-            // Rounding to pixels leaves 0.29 px rms over some 500 of them.
+            // Rounding to pixels has an error of 0.29 px rms, averaged over about 500 pixels.
             assert!((line.angle - angle).abs() < 5e-4 && (line.distance_px - distance).abs() < 0.15, "{line:?}");
         }
     }

@@ -1,6 +1,5 @@
-//! In: grey pictures of the stripe. Out: the stages from picture to skeleton, and from peaks to chosen points; each
-//! with the shader of its name and its CPU twin.
-//! Frame and unit: pixels, grey levels; points in the poses' frame, mm.
+//! In: grey pictures of the stripe. Out: the stages from picture to skeleton, and from peaks to chosen points. Each has
+//! a shader of the same name and a CPU twin. Frame and unit: pixels, grey levels; points in the poses' frame, mm.
 
 pub mod ambient;
 pub mod bound;

@@ -1,22 +1,21 @@
-//! In: camera, laser plane, lines across the stripe. Out: them in f32 as the stage that makes points uses them, and
-//! its uniform block.
-//! Frame and unit: camera frame, px, mm; each field says.
+//! In: camera, laser plane, lines across the stripe. Out: the same in f32 for the stage that computes points, and its
+//! uniform block. Frame and unit: camera frame, px, mm; stated at each field.
 
 use super::choose::Lines;
 use crate::camera::{Distortion, Intrinsics};
 use crate::geometry::{Camera, Plane};
 use glam::{DVec3, Vec2, Vec3};
 
-/// Camera and laser plane as the stage uses them: f32, the camera's frame.
+/// Camera and laser plane in the stage's format: f32, in the camera frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Optics {
     /// fx, fy, cx, cy, skew; px.
     pub pinhole: [f32; 5],
     /// k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4.
     pub distortion: [f32; 12],
-    /// From the tilted sensor back to the plane that the lens draws on, rows one below the other.
+    /// From the tilted sensor back to the plane on which the lens forms the image, row by row.
     pub untilt: [f32; 9],
-    /// normal · X = offset, mm; the offset is positive.
+    /// Unit normal of the laser plane: normal · X = offset, mm, with a positive offset.
     pub normal: Vec3,
     /// Distance of the plane from the camera's centre, mm.
     pub offset: f32,
@@ -34,7 +33,7 @@ impl Optics {
             offset: laser.offset as f32,
         }
     }
-    /// Brown-Conrady's five terms say all about the lens: the stage leaves the others out.
+    /// Whether Brown-Conrady's five terms describe the lens completely: then the stage has no other terms.
     #[inline]
     pub fn plain(&self) -> bool {
         self.distortion[5..].iter().all(|t| *t == 0.0) && self.untilt == FLAT
@@ -51,12 +50,12 @@ impl Optics {
     }
 }
 
-/// No tilt.
+/// The matrix of a sensor without tilt.
 pub const FLAT: [f32; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
 fn untilt(lens: &Distortion) -> [f32; 9] {
     let back = lens.tilt().and_then(|t| t[0].try_inverse());
-    // Row 3 column 3 near 1: the map is one of rays, its scale is free.
+    // Row 3 column 3 is scaled to 1: the matrix maps rays, so its scale is free.
     back.map_or(FLAT, |t| std::array::from_fn(|i| (t[(i / 3, i % 3)] / t.m33) as f32))
 }
 
@@ -72,7 +71,7 @@ pub struct PointFrame {
     pub cx: f32,
     /// Principal point, px from the middle of the top row.
     pub cy: f32,
-    /// Shear of the pixel grid: u grows by so many px as y grows by 1 on the plane z = 1.
+    /// Shear of the pixel grid: u grows by this many px if y grows by 1 on the plane z = 1.
     pub skew: f32,
     /// Radial distortion, numerator: r².
     pub k1: f32,
@@ -98,7 +97,7 @@ pub struct PointFrame {
     pub s3: f32,
     /// Thin prism along the columns: r⁴.
     pub s4: f32,
-    /// Rows of [`Optics::untilt`].
+    /// [`Optics::untilt`], row 1, column 1.
     pub t0: f32,
     /// Row 1, column 2.
     pub t1: f32,
@@ -124,30 +123,30 @@ pub struct PointFrame {
     pub normal_z: f32,
     /// Distance of the laser plane from the camera's centre, mm.
     pub offset: f32,
-    /// Bits of the number that stands for no point; a shader cannot write them down.
+    /// Bits of the number that means "no point" (NaN), which a shader cannot write as a literal.
     pub none: u32,
-    /// As in [`Lines`].
+    /// Number of lines, as in [`Lines`].
     pub lines: u32,
-    /// As in [`Lines`].
+    /// 1 if the lines are columns, as in [`Lines`].
     pub columns: u32,
-    /// As in [`Lines`], px.
+    /// Columns or rows in a line, px, as in [`Lines`].
     pub line_px: u32,
     /// [`Lines::reach`], lines.
     pub echo_reach: i32,
-    /// As in [`Lines`], 0..=1.
+    /// Least amplitude over the strongest nearby, as in [`Lines`], 0..=1.
     pub echo: f32,
-    /// As in [`Lines`], px.
+    /// Width below which a peak may be a cut spot, as in [`Lines`], px.
     pub cut_width: f32,
-    /// As in [`Lines`], 0..=1.
+    /// Least amplitude of such a peak over the strongest nearby, as in [`Lines`], 0..=1.
     pub cut_amplitude: f32,
     /// Always 0: fills the block to a multiple of 16 bytes.
     pub reserved_1: u32,
-    /// Always 0, as well.
+    /// Always 0, like the field before.
     pub reserved_2: u32,
 }
 
 impl PointFrame {
-    /// The rig and the lines in one block.
+    /// The block of this rig and these lines.
     pub fn new(o: &Optics, l: &Lines) -> PointFrame {
         let ([fx, fy, cx, cy, skew], [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4]) = (o.pinhole, o.distortion);
         let [t0, t1, t2, t3, t4, t5, t6, t7, t8] = o.untilt;
@@ -196,7 +195,7 @@ impl PointFrame {
             reserved_2: 0,
         }
     }
-    /// Camera and laser plane that it was made from.
+    /// Camera and laser plane of the block.
     pub fn optics(&self) -> Optics {
         Optics {
             pinhole: [self.fx, self.fy, self.cx, self.cy, self.skew],
@@ -209,7 +208,7 @@ impl PointFrame {
             offset: self.offset,
         }
     }
-    /// Lines that it was made from.
+    /// Lines of the block.
     pub fn lines(&self) -> Lines {
         Lines {
             lines: self.lines,

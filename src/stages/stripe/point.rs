@@ -1,6 +1,6 @@
-//! In: chosen peaks, the camera, the laser plane, the shot's pose. Out: points with their standard deviation. The
-//! stage also makes the last choice: peaks that are weak beside another.
-//! Frame and unit: the frame that the given transform leads to (base or grid), mm. docs/math.md, Stripe peak (7), (8).
+//! In: chosen peaks, the camera, the laser plane, the shot's pose. Out: points with their standard deviation. The stage
+//! also makes the last choice: it rejects peaks that are weak beside another. Frame and unit: the frame that the given
+//! transform leads to (base or grid), mm. docs/math.md, Stripe peak (7), (8).
 
 use super::choose::{LINE_OF, beside};
 use super::optics::PointFrame;
@@ -15,27 +15,27 @@ use glam::Vec3;
 
 pub use super::optics::{FLAT, Optics};
 
-/// A point of the profile, 4 words; not a number where the peak was refused.
+/// A point of the profile, 4 words; NaN if the peak was rejected.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Point {
-    /// mm
+    /// Position in the frame that the pose leads to, mm.
     pub position: Vec3,
-    /// Standard deviation along the direction in which the point moves with the stripe's centre, mm; from the
-    /// peak's own noise, not from calibration or robot.
+    /// Standard deviation along the direction in which the point moves with the stripe's centre, mm. It contains the
+    /// peak's own noise, not that of calibration or robot.
     pub sigma_mm: f32,
 }
 
 impl Point {
-    /// What stands for no point: not a number in all four words.
+    /// Marks "no point": NaN in all four words.
     pub const NONE: Point = Point { position: Vec3::NAN, sigma_mm: f32::NAN };
 }
 
-/// 1: the lens has terms beside Brown-Conrady's five, or its sensor is tilted.
+/// 1: the lens has terms beyond Brown-Conrady's five, or its sensor is tilted.
 pub const FULL_LENS: &str = "full_lens";
 
-/// Newton steps of the lens inversion. The first error is the distortion itself, at most 0.2; each step squares it,
-/// so five leave less than 1e-6 px for every lens whose distortion is monotonic over the picture.
+/// Newton steps of the lens inversion. The first error is the distortion itself, at most 0.2, and each step squares it.
+/// Five steps therefore leave less than 1e-6 px for every lens whose distortion is monotonic over the picture.
 pub(in crate::stages) const NEWTON: u32 = 5;
 
 /// CPU twin: one point per peak; peaks without a point get [`Reject::NoPoint`].
@@ -43,7 +43,7 @@ pub fn points<To: Frame>(peaks: &mut [Peak], optics: &Optics, to_from_camera: &R
     posed(peaks, optics, &pose_words(to_from_camera))
 }
 
-/// The same with the transform as [`pose_words`].
+/// The same with the transform in the format of [`pose_words`].
 pub fn posed(peaks: &mut [Peak], optics: &Optics, pose: &[f32; 12]) -> Vec<Point> {
     peaks.iter_mut().map(|k| one(k, optics, pose)).collect()
 }
@@ -60,12 +60,12 @@ pub(in crate::stages) fn one(k: &mut Peak, optics: &Optics, pose: &[f32; 12]) ->
     Point { position: Vec3::new(row(0), row(1), row(2)), sigma_mm }
 }
 
-/// The viewing ray's foot on the laser plane, camera frame, and its standard deviation; mm.
+/// The intersection of a peak's ray with the laser plane, and its standard deviation; camera frame, mm.
 pub fn camera_point(k: &Peak, o: &Optics) -> Option<(Vec3, f32)> {
     let [fx, fy, cx, cy, skew] = o.pinhole;
     let yv = (k.v - cy) / fy;
     let xv = (k.u - cx - skew * yv) / fx;
-    // One pixel along the peak's normal.
+    // Change of the ray for one pixel along the peak's normal.
     let dv = k.normal_v / fy;
     let du = (k.normal_u - skew * dv) / fx;
     let (x, y, dx, dy) = undistort([xv, yv, du, dv], o)?;
@@ -75,15 +75,15 @@ pub fn camera_point(k: &Peak, o: &Optics) -> Option<(Vec3, f32)> {
     if !(slope > 1e-6 && z < 1e6) {
         return None;
     }
-    // dx, dy of the ray, dz from the plane.
+    // dx and dy come from the ray, dz from the plane.
     let dz = -z * (nx * dx + ny * dy) / slope;
     let (ex, ey) = (dz * x + z * dx, dz * y + z * dy);
     let per_px = (ex * ex + (ey * ey + dz * dz)).sqrt();
     Some((Vec3::new(x * z, y * z, z), per_px * k.sigma_px))
 }
 
-/// A place on the sensor and a small move there, undone by Newton's method: the ray and how it moves; `None` beyond
-/// the picture of a lens that folds over.
+/// Inverts the lens by Newton's method, for a place on the sensor and a small move there: the ray, and the move of the
+/// ray. `None` where the lens model folds over.
 pub fn undistort([xv, yv, du, dv]: [f32; 4], o: &Optics) -> Option<(f32, f32, f32, f32)> {
     let [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4] = o.distortion;
     let full = !o.plain();
@@ -131,7 +131,7 @@ pub fn undistort([xv, yv, du, dv]: [f32; 4], o: &Optics) -> Option<(f32, f32, f3
     (det > 0.0 && a + d > 0.0 && x.abs() < 1e9 && y.abs() < 1e9).then_some((x, y, dx, dy))
 }
 
-/// The last choice of each peak and its point; one invocation a peak.
+/// The last choice of each peak, and its point; one invocation per peak.
 pub const STAGE: Stage = Stage {
     name: "point",
     wgsl: include_str!("../../../shaders/point.wgsl"),
@@ -152,7 +152,7 @@ pub const STAGE: Stage = Stage {
     overrides: &[FULL_LENS],
 };
 
-/// The shot's transform as the stage reads it: three rows of rotation and translation.
+/// The shot's transform in the stage's format: three rows of rotation and translation.
 pub fn pose_words<To: Frame>(to_from_camera: &Rigid<To, Camera>) -> [f32; 12] {
     let (r, t) = (&to_from_camera.rotation, &to_from_camera.translation);
     std::array::from_fn(|i| if i % 4 == 3 { t[i / 4] as f32 } else { r[(i / 4, i % 4)] as f32 })
@@ -173,9 +173,9 @@ pub(crate) fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-/// Largest difference of two lists of points in units of 1 um, sigma in units of 1 %; flags exact. Points leave the
-/// same f32 steps on both sides, and no sum is longer than five terms: a few ulps of 500 mm (0.03 um) through a fused
-/// multiply-add here and there.
+/// Largest difference of two lists of points in units of 1 um, and of sigma in units of 1 %; flags must be equal. Both
+/// sides take the same f32 steps, and no sum has more than five terms. Fused multiply-adds change the result by a few
+/// ulps of 500 mm (0.03 um).
 pub fn apart(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
     if gpu[4] != twin[4] {
         return f64::INFINITY;
@@ -191,7 +191,8 @@ pub fn apart(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
     })
 }
 
-/// The image of the part of the laser plane within a depth range: lit there is where the laser can be.
+/// Depth z at which a pixel's ray meets the laser plane, camera frame, mm; `None` if it does not. The laser can only be
+/// visible at pixels whose depth lies in the working range.
 pub fn plane_in_view(camera: &Intrinsics, laser: &Plane<Camera>, x: u32, y: u32) -> Option<f64> {
     let ray = camera.ray_from_pixel(&Vec2::new(f64::from(x), f64::from(y)))?;
     Some(ray.meet(laser)?.z)
@@ -216,7 +217,7 @@ mod tests {
         }
     }
 
-    /// Lenses and sensors of all kinds, up to 15 % of barrel and 15 degrees of tilt, each over the whole of its
+    /// Lenses and sensors of all kinds, up to 15 % of barrel distortion and 15 degrees of tilt, each over its complete
     /// picture.
     fn lenses() -> Vec<Intrinsics> {
         let of = |fx: f64, terms: [f64; 14]| Intrinsics { fx, fy: fx, distortion: Distortion(terms), ..camera() };
@@ -246,8 +247,8 @@ mod tests {
                     let here = Vec2::new(f64::from(d.x as f32), f64::from(d.y as f32));
                     let exact = back(here);
                     let error_px = (Vec2::new(f64::from(x), f64::from(y)) - exact).norm() * camera.fx;
-                    // f32 holds a ray of 0.5 to 3e-8, which is 2e-5 px at 611 px; a few roundings may add up, and the
-                    // tilt's.
+                    // f32 has a precision of 3e-8 for a ray of 0.5, which is 2e-5 px at 611 px. A few roundings may add
+                    // up, and those of the tilt.
                     let roundings = if optics.plain() { 6e-5 } else { 1.2e-4 };
                     assert!(error_px < 1e-6 + roundings * camera.fx / 611.6, "lens {i} at ({u}, {v}): {error_px}");
                     let move_ = back(here + Vec2::new(1e-6, 2e-6)) - exact;
@@ -257,12 +258,13 @@ mod tests {
         }
     }
 
-    /// What f32 costs in the end: less than the last bit of a coordinate of the cloud.
+    /// The final cost of f32: less than the last bit of a coordinate of the cloud.
     #[test]
     fn points_are_those_of_f64_to_a_twentieth_of_a_micrometre() {
         let (camera, plane) = (camera(), Plane::new(Vec3::new(-0.019, 0.883, 0.469), 72.15).unwrap());
         let optics = Optics::new(&camera, &plane);
-        // The rig in f32, worked out in f64: what is left is the arithmetic, not the rounding of the calibration.
+        // The f32 values of the rig, computed with in f64: the difference is that of the arithmetic, not of rounding
+        // the calibration.
         let [fx, fy, cx, cy, skew] = optics.pinhole.map(f64::from);
         let distortion = Distortion::from_opencv(&optics.distortion.map(f64::from)).unwrap();
         let exact = Intrinsics { fx, fy, cx, cy, skew, distortion, ..camera };
@@ -276,7 +278,7 @@ mod tests {
                 let ray = exact.ray_from_pixel(&Vec2::new(f64::from(u), f64::from(v))).unwrap();
                 let truth = ray.meet(&exact_plane).unwrap();
                 if truth.z < 320.0 {
-                    // Across the ray: along it a pixel of any size can mean any length.
+                    // Error across the ray: along it, a pixel error of any size can be any length.
                     let d = Vec3::from(p.as_dvec3().to_array()) - truth;
                     worst = worst.max((d - truth.normalize() * truth.normalize().dot(&d)).norm());
                 }

@@ -10,15 +10,15 @@ use crate::stages::listing::{self, HEADER_WORDS, mask_index, tile_index};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
-/// Width and height of the tiles that the stages work in, in pixels: one word wide.
+/// Width and height of the tiles that the stages work on, in pixels: one word wide.
 pub const TILE: (u32, u32) = (32, 8);
 
 /// A pixel in one word: x | y << 16.
 pub fn pack(x: u32, y: u32) -> u32 {
     x | y << 16
 }
-/// CPU twin: lit pixels tile by tile (rows of tiles from the top, tiles from the left), within a
-/// tile row by row. One tile is one unit of GPU work, hence this order and not the plain one.
+/// CPU twin: lit pixels tile by tile (rows of tiles from the top, tiles from the left), within a tile row by row. The
+/// order is not plain row order because one tile is one unit of GPU work.
 pub fn twin(mask: &Mask) -> Vec<u32> {
     let words = mask.words_per_row();
     let mut list = Vec::new();
@@ -37,7 +37,7 @@ pub fn twin(mask: &Mask) -> Vec<u32> {
     list
 }
 
-/// Lit pixels per listed tile.
+/// Number of lit pixels in each listed tile.
 pub const COUNT: Stage = Stage {
     name: "count",
     wgsl: include_str!("../../../shaders/count.wgsl"),
@@ -54,7 +54,7 @@ pub const COUNT: Stage = Stage {
     overrides: &[PX_LOG2],
 };
 
-/// Pixels of each tile.
+/// Counts the pixels of each tile.
 pub const COUNTING: Step = Step {
     stage: &COUNT,
     twin: count_twin,
@@ -63,7 +63,7 @@ pub const COUNTING: Step = Step {
     same: Same::Words,
 };
 
-/// Counts before each tile in its row of tiles.
+/// Number of pixels before each tile in its row of tiles, and each row's total.
 pub const SCAN_ROWS: Stage = Stage {
     name: "scan_rows",
     wgsl: include_str!("../../../shaders/scan_rows.wgsl"),
@@ -76,7 +76,7 @@ pub const SCAN_ROWS: Stage = Stage {
     ..COUNT
 };
 
-/// Where each tile begins in its row.
+/// Computes the first entry of each tile in its row.
 pub const SCANNING_ROWS: Step = Step {
     stage: &SCAN_ROWS,
     twin: scan_rows_twin,
@@ -85,7 +85,7 @@ pub const SCANNING_ROWS: Step = Step {
     same: Same::Words,
 };
 
-/// Counts before each row of tiles in its shot, and each shot's.
+/// Number of pixels before each row of tiles in its shot, and each shot's total.
 pub const SCAN_SHOTS: Stage = Stage {
     name: "scan_shots",
     wgsl: include_str!("../../../shaders/scan_shots.wgsl"),
@@ -98,7 +98,7 @@ pub const SCAN_SHOTS: Stage = Stage {
     ..COUNT
 };
 
-/// Where each row begins in its shot.
+/// Computes the first entry of each row in its shot.
 pub const SCANNING_SHOTS: Step = Step {
     stage: &SCAN_SHOTS,
     twin: scan_shots_twin,
@@ -107,7 +107,7 @@ pub const SCANNING_SHOTS: Step = Step {
     same: Same::Words,
 };
 
-/// The point list's header.
+/// The header of the pixel list.
 pub const HEAD: Stage = Stage {
     name: "header",
     wgsl: include_str!("../../../shaders/header.wgsl"),
@@ -121,7 +121,7 @@ pub const HEAD: Stage = Stage {
     ..COUNT
 };
 
-/// What the batch came to.
+/// Writes the batch's totals.
 pub const HEADING: Step = Step {
     stage: &HEAD,
     twin: head_twin,
@@ -130,7 +130,7 @@ pub const HEADING: Step = Step {
     same: Same::Words,
 };
 
-/// The point list: (x | y << 16, shot).
+/// The pixel list: (x | y << 16, shot).
 pub const STAGE: Stage = Stage {
     name: "skeleton",
     wgsl: include_str!("../../../shaders/skeleton.wgsl"),
@@ -147,7 +147,7 @@ pub const STAGE: Stage = Stage {
     ..COUNT
 };
 
-/// The list of pixels.
+/// Writes the list of pixels.
 pub const STEP: Step = Step {
     stage: &STAGE,
     twin: stage_twin,
@@ -156,13 +156,13 @@ pub const STEP: Step = Step {
     same: Same::Words,
 };
 
-/// Word of the pixel list's header: pixels found, [`crate::stages::listing::COUNT`] of which are listed.
+/// Word of the pixel list's header: pixels found, of which [`crate::stages::listing::COUNT`] are listed.
 pub const FOUND: usize = 4;
-/// Word of the pixel list's header: tiles that were looked at closely.
+/// Word of the pixel list's header: tiles that could not be proven dark.
 pub const LISTED: usize = 5;
-/// Word of the pixel list's header: shortened lists of thinning that still held a tile.
+/// Word of the pixel list's header: shortened lists of thinning that still contained a tile.
 pub const LEFT: usize = 6;
-/// Word of the pixel list's header: pictures of the batch.
+/// Word of the pixel list's header: number of pictures in the batch.
 pub const SHOTS: usize = 7;
 /// Words of the pixel list's header before the shots' first pixels.
 pub const HEADER: usize = 8;

@@ -1,6 +1,6 @@
-//! In: pictures, tiles that stand alone in the list with the least sum of their windows. Out: those with one pixel that
-//! passes against that are settled; those with more go on as runs of one.
-//! Frame and unit: pixels, tiles of 32 x 8; sums in 256ths of full scale.
+//! In: pictures; tiles that stand alone in the list, with the least sum of their windows. Out: tiles with one pixel
+//! that may pass against that sum are finished; tiles with more become runs of one tile. Frame and unit: pixels, tiles
+//! of 32 x 8; sums in 256ths of full scale.
 
 use super::stats::{depth_shift, padded_pixel};
 use super::threshold;
@@ -31,7 +31,7 @@ pub const STAGE: Stage = Stage {
     ..threshold::MEAN
 };
 
-/// Lit pixels of the tiles that stand alone.
+/// Finds the lit pixels of the tiles that stand alone.
 pub const STEP: Step = Step {
     stage: &STAGE,
     twin,

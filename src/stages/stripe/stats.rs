@@ -8,7 +8,7 @@ use crate::stages::frame::{Frame, PX_LOG2, SHARED, frame_of};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
-/// Sums and extremes of blocks of 16 x 8 pixels; one invocation a block.
+/// Sums and extremes of blocks of 16 x 8 pixels; one invocation per block.
 pub const STAGE: Stage = Stage {
     name: "stats",
     wgsl: include_str!("../../../shaders/stats.wgsl"),
@@ -27,13 +27,13 @@ pub const STAGE: Stage = Stage {
 pub const STEP: Step =
     Step { stage: &STAGE, twin, binds: &["frame", "image", "stats"], groups: Groups::Of(groups), same: Same::Words };
 
-/// One invocation a block, two blocks a tile.
+/// One invocation per block, two blocks per tile.
 pub fn groups(f: &Frame) -> [u32; 3] {
     STAGE.groups([2 * f.tiles(), 1, 1])
 }
 
-/// Bits beyond eight of the pictures' depth. Deeper pictures are given in 256ths of full scale, which keeps a block
-/// in two words: rounded to the safe side, the largest pixel up and all else down.
+/// Number of bits by which the pictures' depth exceeds eight. Statistics of deeper pictures are in 256ths of full
+/// scale, so that a block fits two words. They are rounded to the safe side: the largest pixel up, all others down.
 pub fn depth_shift(f: &Frame) -> u32 {
     f.full_scale.count_ones() - 8
 }
@@ -56,7 +56,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// Out of the two words of a block.
+    /// A block from its two words.
     pub fn unpack(words: &[u32]) -> Block {
         Block {
             sum: words[0] & 0x7fff,

@@ -1,5 +1,5 @@
-//! In: a mask. Out: the mask thinned to lines one pixel wide, nothing left to delete.
-//! Frame and unit: pixels. Zhang and Suen 1984 \[zhang84\], Guo and Hall 1989 \[guo89\], as OpenCV has them.
+//! In: a mask. Out: the mask thinned to lines one pixel wide, from which nothing more can be deleted. Frame and unit:
+//! pixels. Zhang and Suen 1984 \[zhang84\], Guo and Hall 1989 \[guo89\], with OpenCV's details.
 
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Stage};
@@ -29,7 +29,7 @@ pub const STAGE: Stage = Stage {
     overrides: &[PX_LOG2, RULE],
 };
 
-/// One sub-iteration of thinning; a round binds other headers and turns the masks around.
+/// One sub-iteration of thinning; a round binds different headers and exchanges the masks.
 pub const STEP: Step = Step {
     stage: &STAGE,
     twin: stage_twin,
@@ -38,30 +38,30 @@ pub const STEP: Step = Step {
     same: Same::Words,
 };
 
-/// Selects the rule when the pipeline is built, [`Thinning::number`].
+/// Override constant that selects the rule when the pipeline is built, [`Thinning::number`].
 pub const RULE: &str = "rule";
 
-/// The rule that decides which boundary pixels go.
+/// The rule by which boundary pixels are deleted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Thinning {
-    /// Eats stripes two pixels wide that run at 45 degrees from their ends on, until two pixels are left.
+    /// Shortens stripes two pixels wide that run at 45 degrees from their ends, until two pixels remain.
     #[default]
     ZhangSuen,
-    /// Keeps those; of speckled stripes along the image's axes it keeps more pixels beside the middle.
+    /// Preserves those. On speckled stripes along the image's axes it leaves more pixels beside the middle.
     GuoHall,
 }
 
-/// Sine of twice the angle, off the image's axes, from which a stripe counts as slanted: 22.5 degrees.
+/// Sine of twice the angle to the image's axes from which a stripe counts as slanted: 22.5 degrees.
 const SLANTED: f32 = std::f32::consts::FRAC_1_SQRT_2;
 
-/// Whether a stripe that is crossed in this direction (a unit vector of the image) lies aslant.
+/// Whether a stripe is slanted; the argument is the direction across it (a unit vector of the image).
 pub(in crate::stages) fn slanted(Vec2 { x, y }: Vec2) -> bool {
     2.0 * (x * y).abs() > SLANTED
 }
 
 impl Thinning {
-    /// The rule for a stripe that is crossed in this direction (a unit vector of the image).
+    /// The rule for a stripe with this direction across it (a unit vector of the image).
     pub fn across(across: Vec2) -> Thinning {
         if slanted(across) { Thinning::GuoHall } else { Thinning::ZhangSuen }
     }
@@ -92,7 +92,7 @@ pub fn deletions(rule: Thinning, p: &Neighbours, second: bool) -> u32 {
     let [p2, p3, p4, p5, p6, p7, p8, p9] = *p;
     match rule {
         Thinning::ZhangSuen => {
-            // A(p) = 1: exactly one step from dark to lit on the way round.
+            // A(p) = 1: exactly one step from dark to lit around the pixel.
             let (mut one, mut more) = (0, 0);
             for i in 0..8 {
                 let step = !p[i] & p[(i + 1) % 8];
@@ -140,7 +140,7 @@ pub fn neighbours(rows: [&[u32]; 3], i: usize) -> Neighbours {
     [at(0, i), east(0), east(1), east(2), at(2, i), west(2), west(1), west(0)]
 }
 
-/// Bits of word `i` that may be deleted: OpenCV never touches the outermost rows and columns.
+/// Bits of word `i` that may be deleted. As in OpenCV, the outermost rows and columns stay.
 #[inline]
 pub fn interior(width: u32, i: usize) -> u32 {
     let first = 32 * i as u32;
@@ -153,16 +153,16 @@ pub fn interior(width: u32, i: usize) -> u32 {
     bits
 }
 
-/// CPU twin: sub-iterations until two in a row delete nothing. A row whose surroundings did not
-/// change in the last two is left alone, which cannot change the result: the same rule was applied
-/// to the same pixels before.
+/// CPU twin: sub-iterations until two in a row delete nothing. A row is skipped if its neighbourhood did not change in
+/// the last two. That cannot change the result, because the same rule was already applied to the same pixels.
 pub fn twin(mask: &Mask, rule: Thinning) -> Mask {
     let (h, words) = (mask.height as usize, mask.words_per_row());
     let (mut now, mut next) = (mask.clone(), mask.clone());
     if h < 3 || mask.width < 3 {
         return now;
     }
-    // The sub-iteration in which a row last changed, counted from 2 so that 0 means never.
+    // 3 plus the sub-iteration in which a row last changed; 2 before that, so that the first two sub-iterations examine
+    // every row.
     let mut changed = vec![2usize; h];
     let inside: Vec<u32> = (0..words).map(|i| interior(mask.width, i)).collect();
     for step in 0.. {
@@ -200,7 +200,7 @@ pub(crate) fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) 
     let f = frame_of(b);
     let rule = Thinning::of(overrides);
     let [_, listing, list, before, after, stamps] = b else { unreachable!() };
-    // A row of the mask as words; beyond the last tile there is none, but it is never asked for: y + 1 < height.
+    // A row of the mask as words. Only rows of the picture are requested, because y + 1 < height.
     let line =
         |shot: u32, y: u32| -> Vec<u32> { (0..f.tiles_x).map(|i| before[f.mask_word(shot, 32 * i, y)]).collect() };
     for &tile in &list[..listing[listing::COUNT] as usize] {

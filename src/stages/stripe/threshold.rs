@@ -1,5 +1,5 @@
-//! In: a grey picture. Out: a mask, lit where a pixel is brighter than the mean of its surroundings.
-//! Frame and unit: pixels; offset and minimum in grey levels of the picture's own depth.
+//! In: a grey picture. Out: a mask of the pixels that are brighter than the mean of their neighbourhood. Frame and
+//! unit: pixels; offset and minimum in grey levels of the picture's own depth.
 
 use super::stats::padded_pixel;
 use super::threshold_params::{ThresholdParams, Window};
@@ -12,10 +12,10 @@ use crate::stages::listing;
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
-/// Half the window's edge, less a half: a constant of the mean window's pipeline.
+/// Override constant of the mean window's pipeline; the window's edge is 2 radius + 1.
 pub const RADIUS: &str = "radius";
 
-/// Mean window; its list holds runs of tiles ([`crate::stages::stripe::tiles`]).
+/// Threshold with a mean window; its list contains runs of tiles ([`crate::stages::stripe::tiles`]).
 pub const MEAN: Stage = Stage {
     name: "threshold",
     wgsl: include_str!("../../../shaders/threshold.wgsl"),
@@ -36,7 +36,7 @@ pub const MEAN: Stage = Stage {
     overrides: &[PX_LOG2, RADIUS],
 };
 
-/// Lit pixels of runs of tiles, by the mean of a window.
+/// Finds the lit pixels of runs of tiles, by the mean of a window.
 pub const BY_MEAN: Step = Step {
     stage: &MEAN,
     twin: mean_twin,
@@ -45,7 +45,7 @@ pub const BY_MEAN: Step = Step {
     same: Same::Lists(&[(8, 1)]),
 };
 
-/// Gaussian window.
+/// Threshold with a Gaussian window.
 pub const GAUSSIAN: Stage = Stage {
     name: "threshold_gaussian",
     wgsl: include_str!("../../../shaders/threshold_gaussian.wgsl"),
@@ -62,7 +62,7 @@ pub const GAUSSIAN: Stage = Stage {
     ..MEAN
 };
 
-/// Lit pixels by a Gaussian window.
+/// Finds lit pixels with a Gaussian window.
 pub const BY_GAUSSIAN: Step = Step {
     stage: &GAUSSIAN,
     twin: stage_twin,
@@ -75,7 +75,7 @@ pub const BY_GAUSSIAN: Step = Step {
     ),
 };
 
-/// Quads to words, cut to the picture and the region of interest.
+/// Combines quads to words, cut to the picture and the region of interest.
 pub const GATHER: Stage = Stage {
     name: "gather",
     wgsl: include_str!("../../../shaders/gather.wgsl"),
@@ -94,7 +94,7 @@ pub const GATHER: Stage = Stage {
     ..GAUSSIAN
 };
 
-/// Their words of the mask.
+/// Writes the mask's words of the Gaussian window's tiles.
 pub const GATHERING: Step = Step {
     stage: &GATHER,
     twin: gather_twin,
@@ -103,9 +103,9 @@ pub const GATHERING: Step = Step {
     same: Same::Lists(&[(8, 1)]),
 };
 
-/// Lit exactly when `value - offset > round(sum / n^2)`. Because n is odd the mean is never half way
-/// between two levels, so this is `n^2 (value - offset) > sum + (n^2 - 1) / 2` in whole numbers; the
-/// largest term, 101^2 * 131070, fits in 31 bits.
+/// Lit exactly when `value - offset > round(sum / n^2)`. Because n is odd, the mean is never half way between two
+/// levels. So this is `n^2 (value - offset) > sum + (n^2 - 1) / 2` in whole numbers; the largest term, 101^2 * 131070,
+/// fits in 31 bits.
 #[inline]
 pub fn passes_mean(value: u32, sum: u32, p: &ThresholdParams) -> bool {
     let area = (p.size * p.size) as i32;
@@ -120,7 +120,7 @@ pub fn twin(image: &Image, p: &ThresholdParams) -> Mask {
     }
 }
 
-/// Running column sums, then a running sum along the row: four additions a pixel for any window.
+/// Running column sums, then a running sum along the row: four additions per pixel for any window.
 fn mean(image: &Image, p: &ThresholdParams) -> Mask {
     let (w, h, r) = (image.width as usize, image.height as usize, (p.size / 2) as usize);
     let mut mask = Mask::new(image.width, image.height);
@@ -158,7 +158,7 @@ fn mean(image: &Image, p: &ThresholdParams) -> Mask {
     mask
 }
 
-/// Weights of one axis of the Gaussian window, as OpenCV's getGaussianKernel with sigma 0 gives them.
+/// Weights along one axis of the Gaussian window, as from OpenCV's getGaussianKernel with sigma 0.
 pub fn gaussian_weights(size: u32) -> Vec<f32> {
     match size {
         3 => return vec![0.25, 0.5, 0.25],
@@ -174,7 +174,7 @@ pub fn gaussian_weights(size: u32) -> Vec<f32> {
     raw.iter().map(|v| (v / sum) as f32).collect()
 }
 
-/// Along the row first, then down the columns, both in f32 and in ascending order, as the shader does.
+/// First along the row, then down the columns, both in f32 and in ascending order, as in the shader.
 fn gaussian(image: &Image, p: &ThresholdParams) -> Mask {
     let (w, h, r) = (image.width as usize, image.height as usize, (p.size / 2) as usize);
     let weights = gaussian_weights(p.size);
@@ -210,7 +210,7 @@ fn gaussian(image: &Image, p: &ThresholdParams) -> Mask {
     mask
 }
 
-/// Rows of a picture of either depth as u32.
+/// Rows of a picture of either depth, as u32.
 struct Rows<'a>(&'a Image);
 
 impl<'a> Rows<'a> {
@@ -227,8 +227,7 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// The whole padded batch as pictures, shot by shot: what the stages see beyond the border is what the
-/// padding repeats.
+/// One shot of the padded batch as a picture: beyond the border the stages read the repeated pixels of the padding.
 fn padded_shot(f: &Frame, image: &[u32], px_log2: u32, shot: u32) -> Image {
     let (w, h) = (32 * f.tiles_x, 8 * f.tiles_y);
     let px = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
@@ -254,7 +253,8 @@ pub(crate) fn mean_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     }
 }
 
-/// A tile's lit pixels, row by row, go into both masks, cut to the region of interest; a tile with one is listed.
+/// Stores a tile's lit pixels, row by row, in both masks, cut to the region of interest. A tile with a lit pixel is
+/// listed.
 fn store(f: &Frame, tile: u32, bits: impl Fn(u32) -> u32, roi: &[u32], out: [&mut Vec<u32>; 4]) {
     let (tx, ty, _) = tile_unpack(tile);
     let [mask, lit, listing, list] = out;
@@ -301,7 +301,7 @@ pub(crate) fn gather_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-/// Pixels of the quads that differ, per 100,000.
+/// Number of pixels in the quads that differ, per 100,000.
 pub fn pixels_apart(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
     let (a, b) = (gpu.last().unwrap(), twin.last().unwrap());
     let apart: u32 = a.iter().zip(b).map(|(a, b)| (a ^ b).count_ones()).sum();

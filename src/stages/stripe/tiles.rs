@@ -1,6 +1,6 @@
-//! In: block statistics. Out: the tiles that may hold a lit pixel: those that stand alone, (tile, least sum of its
-//! windows), and runs one below the other, (first tile, number of tiles); the others are proven dark.
-//! Frame and unit: tiles of 32 x 8 pixels, blocks of 16 x 8, sums in 256ths of full scale.
+//! In: block statistics. Out: the tiles that may contain a lit pixel: those that stand alone as (tile, least sum of its
+//! windows), and runs of tiles one below the other as (first tile, number of tiles). The others are proven dark. Frame
+//! and unit: tiles of 32 x 8 pixels, blocks of 16 x 8, sums in 256ths of full scale.
 
 use super::bound::Blocks;
 use super::stats::depth_shift;
@@ -13,7 +13,7 @@ use crate::stages::listing::{self, append};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
-/// Which tiles may hold a lit pixel; one invocation for four tiles, one below the other.
+/// The tiles that may contain a lit pixel; one invocation for four tiles, one below the other.
 pub const STAGE: Stage = Stage {
     name: "tiles",
     wgsl: include_str!("../../../shaders/tiles.wgsl"),
@@ -33,7 +33,7 @@ pub const STAGE: Stage = Stage {
     overrides: &[PX_LOG2, RADIUS, WEIGHTED],
 };
 
-/// Lists the tiles that may hold a lit pixel.
+/// Lists the tiles that may contain a lit pixel.
 pub const STEP: Step = Step {
     stage: &STAGE,
     twin,
@@ -44,15 +44,15 @@ pub const STEP: Step = Step {
 
 /// 1 for a window with weights ([`GAUSSIAN`]): a constant of the pipeline.
 pub const WEIGHTED: &str = "weighted";
-/// Longest run, and the rows of tiles after which runs begin anew.
+/// Length of the longest run. A run never crosses from one group of this many rows of tiles to the next.
 pub const LONGEST: u32 = 4;
 
-/// One invocation four tiles, one below the other.
+/// One invocation for four tiles, one below the other.
 pub fn groups(f: &Frame) -> [u32; 3] {
     STAGE.groups([f.tiles_x * f.tiles_y.div_ceil(LONGEST) * f.shots, 1, 1])
 }
 
-/// The least that the sums of a block's windows can come to.
+/// Lower bound on the sums of a block's windows.
 fn least_sum(f: &Frame, blocks: &Blocks, x: i32, y: i32) -> u32 {
     match f.flags & GAUSSIAN {
         0 => blocks.least_sum(x, y),
@@ -60,7 +60,7 @@ fn least_sum(f: &Frame, blocks: &Blocks, x: i32, y: i32) -> u32 {
     }
 }
 
-/// Some pixel of the block may pass against that.
+/// Whether some pixel of the block may pass against that bound.
 fn may_be_lit(f: &Frame, blocks: &Blocks, x: i32, y: i32) -> bool {
     let deep = depth_shift(f);
     let largest = blocks.block(x, y).largest << deep;
@@ -92,7 +92,7 @@ pub(crate) fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
                 let least = || (0..2).map(|side| least_sum(&f, &blocks, 2 * x as i32 + side, y as i32)).min();
                 match length {
                     0 => {}
-                    // The plain path rests on no bound.
+                    // The plain path uses no bound.
                     1 if f.flags & ALL_TILES == 0 || f.flags & GAUSSIAN != 0 => {
                         append(single_listing, singles, [tile, least().expect("two blocks")]);
                     }

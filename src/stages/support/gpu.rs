@@ -1,5 +1,5 @@
-//! In: what the stage `support` needs of some shots. Out: their peaks' flags, from a GPU.
-//! Frame and unit: as the stage. Buffers grow to the largest batch and are kept.
+//! In: the bindings of the stage `support` for some shots. Out: the flags of their peaks, from a GPU. Frame and unit:
+//! as in the stage. Buffers grow to the largest batch and are then reused.
 
 use super::stage::{Neighbourhood, STAGE, Site, SupportFrame};
 use crate::fault::Result;
@@ -11,7 +11,7 @@ pub struct OnGpu {
     device: Device,
     pipeline: Pipeline,
     replay: Replay,
-    /// In the order of the stage's bindings.
+    /// Buffers in the order of the stage's bindings.
     buffers: Vec<Buffer>,
 }
 
@@ -26,7 +26,7 @@ impl OnGpu {
         })
     }
 
-    /// One word of flags a peak; waits for them.
+    /// One word of flags for each peak; waits for the GPU.
     pub fn judge(
         &mut self,
         frame: &SupportFrame,

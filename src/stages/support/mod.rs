@@ -1,6 +1,7 @@
-//! In: the points of shot after shot. Out: the same shots one later, points without neighbours in the shots before
-//! and after marked. Frame and unit: base frame, mm. A surface goes on from shot to shot; a reflection does not: it
-//! moves otherwise than the light that made it, and a speck stays in the picture while the robot moves.
+//! In: the points of one shot after another. Out: the same shots, one shot later; points without neighbours in the
+//! shots before and after are marked. Frame and unit: base frame, mm. A surface continues from shot to shot. A
+//! reflection does not, because it moves differently from the light that caused it. A speck stays in its place in the
+//! picture while the robot moves.
 
 use super::peak::found::Peak;
 use super::stripe::point::Point;
@@ -17,40 +18,42 @@ pub use stage::{STAGE, cases, stage_twin};
 use gpu::OnGpu;
 use stage::{Neighbourhood, Site, SupportFrame, whole};
 
-/// One shot: peaks and their points, entry by entry.
+/// One shot: its peaks and their points, with the same index.
 #[derive(Clone, Debug)]
 pub struct Profile<T = ()> {
     /// Number of the shot in its scan.
     pub shot: u32,
-    /// What comes back with it.
+    /// Returned with the shot.
     pub cargo: T,
-    /// Of all skeleton pixels, refused ones too.
+    /// Peaks of all skeleton pixels, also rejected ones.
     pub peaks: Vec<Peak>,
-    /// One a peak, base frame, mm; not a number where the peak was refused.
+    /// One point for each peak, base frame, mm; NaN if the peak was rejected.
     pub points: Vec<Point>,
-    /// Places of the light, the same of every shot, base frame: two shots are as far apart as the farthest of them
-    /// moves. Where the laser plane meets the optical axis; on a turntable the stripe's ends too.
+    /// Three places of the light, corresponding ones in every shot, in the base frame. The distance of two shots is the
+    /// largest move of these places. They are where the laser plane meets the optical axis and, on a turntable, also
+    /// the stripe's ends.
     pub anchors: [Vec3; 3],
-    /// Distance of neighbouring points along the stripe at the anchor, mm.
+    /// Distance between neighbouring points along the stripe at the anchor, mm.
     pub pitch: f32,
 }
 
-/// A shot that waits for the one after it.
+/// A shot that waits for the next shot.
 struct Held<T> {
     profile: Profile<T>,
-    /// One a peak, whatever its fate.
+    /// One place for each peak; zeros if the peak was rejected.
     places: Vec<Site>,
-    /// Kept points, sorted along the line.
+    /// Places of the peaks that were kept, sorted along the line.
     sites: Vec<Site>,
 }
 
-/// Holds three shots at a time, whatever the length of the scan.
+/// Judges points by the shots around them. In the steady state three shots are in memory, for any length of the scan.
 pub struct Support<T = ()> {
     params: SupportParams,
     /// Half of the chord, mm.
     radius: f32,
     frame: SupportFrame,
-    /// Direction along the laser line, base frame; only orders the points, so the first shot's serves the scan.
+    /// Direction along the laser line, base frame. It only orders the points, so the first shot's direction is used for
+    /// all.
     axis: Vec3,
     /// Anchors and sites of the last judged shot.
     before: Option<([Vec3; 3], Vec<Site>)>,
@@ -59,9 +62,9 @@ pub struct Support<T = ()> {
 }
 
 impl<T> Support<T> {
-    /// `axis`: unit vector along the laser line, base frame; `width_px`: the stripe's Gaussian sigma; `field_mm`:
-    /// what the picture's longer side sees where the sheet meets the optical axis. Without a device the twin judges,
-    /// with the same result.
+    /// `axis` is the unit vector along the laser line in the base frame, `width_px` the stripe's Gaussian sigma.
+    /// `field_mm` is the length that the picture's longer side covers where the sheet meets the optical axis. Without a
+    /// device the twin judges, with the same result.
     pub fn new(
         params: SupportParams,
         width_px: f32,
@@ -82,7 +85,7 @@ impl<T> Support<T> {
         })
     }
 
-    /// Takes shots in order and gives those that are judged: all but the last, which waits for its neighbour, or with
+    /// Takes shots in order and returns those that are judged: all but the last, which waits for its neighbour; with
     /// `end` all.
     pub fn take(&mut self, profiles: Vec<Profile<T>>, end: bool) -> Result<Vec<Profile<T>>> {
         let mut run: Vec<Held<T>> = self.now.take().into_iter().collect();
@@ -114,7 +117,7 @@ impl<T> Support<T> {
         Held { profile, places, sites }
     }
 
-    /// Judges every shot of a run by its two neighbours; the one behind the last is `now`.
+    /// Judges every shot of a run by its two neighbours; the neighbour after the last shot is `now`.
     fn judge(&mut self, run: &mut [Held<T>]) -> Result<()> {
         let beside = self.before.iter().map(|(anchors, sites)| (anchors, sites));
         let beside = beside.chain(run.iter().chain(&self.now).map(|h| (&h.profile.anchors, &h.sites)));
@@ -170,7 +173,7 @@ impl<T> Support<T> {
     }
 }
 
-/// Median level beside the kept peaks: room light, which is no sign of a reflection.
+/// Median level beside the kept peaks: it is room light, not a sign of a reflection.
 fn usual_background(peaks: &[Peak]) -> f32 {
     let mut levels: Vec<f32> = peaks.iter().filter(|k| k.kept()).map(|k| k.background).collect();
     if levels.is_empty() {
@@ -185,7 +188,8 @@ mod tests {
     use super::*;
     use crate::stages::peak::found::Reject;
 
-    /// A flat surface of 21 points a shot, 0.25 mm apart, shots 0.35 mm apart; one more point 3 mm above the middle.
+    /// A flat surface of 21 points per shot, 0.25 mm apart, in shots 0.35 mm apart; `stray` adds one point 3 mm above
+    /// the middle.
     fn shot(index: u32, width_px: f32, stray: bool) -> Profile {
         let mut peaks = vec![Peak { width_px, amplitude: 100.0, sigma_px: 0.05, shot: index, ..Peak::default() }; 21];
         let mut points: Vec<Point> = (0..21)
@@ -229,7 +233,7 @@ mod tests {
     fn what_goes_on_in_the_next_shot_is_believed() {
         let out = scan(1.0, &[2, 3]);
         assert!(out[2].peaks[21].kept() && out[3].peaks[21].kept());
-        // The same two points with the width of two stripes need more company than one neighbour.
+        // The same two points at 1.5 times the stripe's width are doubtful and need more support than one neighbour.
         let out = scan(1.5, &[2, 3]);
         assert!(!out[2].peaks[21].kept() && !out[3].peaks[21].kept());
         assert!(out[2].peaks[..21].iter().all(Peak::kept));
@@ -242,7 +246,7 @@ mod tests {
         assert!(support.take(Vec::new(), true).unwrap()[0].peaks.iter().all(Peak::kept));
     }
 
-    /// One at a time or all at once, on the twin or on a GPU: the same fate for every peak.
+    /// One shot at a time or several at once, on the twin or on a GPU: every peak gets the same flags.
     #[test]
     fn runs_of_any_length_are_judged_alike() {
         let odd = |i| i == 2 || i == 3;

@@ -1,34 +1,34 @@
-//! In: what a person may choose about neighbours. Out: the choice, checked.
-//! Frame and unit: each field says.
+//! In: the user's settings for neighbours. Out: the settings, checked. Frame and unit: stated at each field.
 
 use crate::fault::{Fault, Result};
 
-/// How much of a neighbourhood a point needs. A point on a flat surface has, in each of the two neighbouring shots, a
-/// chord of points within the radius; support is the number found over the number expected there.
+/// Support that a point needs. A point on a flat surface has, in each of the two neighbouring shots, a chord of points
+/// within the radius. Support is the number of points found over the number expected there.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SupportParams {
-    /// Whether points are judged by their neighbours at all.
+    /// Whether points are judged by their neighbours.
     pub on: bool,
-    /// Half of the chord on a neighbouring shot's line, 0.0001..=1000 mm: what a point may be wrong by and still be
-    /// useful; smaller removes more at corners. Unless given a 540th of what the picture's longer side sees where the
-    /// sheet meets the optical axis: a camera that is turned sees the same.
+    /// Half of the chord on a neighbouring shot's line, 0.0001..=1000 mm: the error of a point that is still
+    /// acceptable. A smaller radius removes more points at corners. If not given, it is a 540th of the length that the
+    /// picture's longer side covers where the sheet meets the optical axis. The longer side makes it independent of how
+    /// the camera is turned.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_mm: Option<f32>,
-    /// How much farther than the distance of the shots a neighbour may lie, 1..=3; 1.2 is a slope of 33 degrees.
+    /// Distance at which a neighbour may lie, over the distance of the shots, 1..=3; 1.2 is a slope of 33 degrees.
     pub slope: f32,
     /// Support that a peak of the right width needs, 0..=1.
     pub clean: f32,
     /// Support that any other peak needs, 0..=1.
     pub doubtful: f32,
-    /// Share of the amplitude, 0..=10, by which the level beside a peak may exceed the shot's usual level there.
-    /// A reflection lies in the glow of what it reflects.
+    /// Share of the amplitude, 0..=10, by which the level beside a peak may exceed the shot's usual level. A reflection
+    /// lies in the glow of the light that it reflects.
     pub haze: f32,
     /// Support that a peak in such a glow needs, 0..=1.
     pub hazy: f32,
-    /// Widths over the stripe's that count as right.
+    /// Smallest and largest width of a clean peak, over the stripe's width.
     pub right_width: [f32; 2],
-    /// Largest standard deviation of a clean peak's centre over the stripe's sigma, 0.01..=2; others are doubtful.
+    /// Largest standard deviation of a clean peak's centre over the stripe's sigma, 0.01..=2; other peaks are doubtful.
     pub sure: f32,
 }
 
@@ -49,7 +49,7 @@ impl Default for SupportParams {
 }
 
 impl SupportParams {
-    /// Refuses what is out of its range.
+    /// Refuses values out of their range.
     pub fn check(&self) -> Result<()> {
         for (name, value, low, high) in [
             ("radius_mm", self.radius_mm.unwrap_or(1.0), 1e-4, 1e3),

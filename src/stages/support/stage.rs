@@ -1,6 +1,6 @@
-//! In: peaks of some shots, their points' places, the points of the shots beside them. Out: the peaks' flags; kept ones
-//! with too few neighbours carry [`Reject::Unsupported`].
-//! Frame and unit: base frame in whole 2⁻¹⁴ mm (0.06 µm): the same neighbours are counted on every machine.
+//! In: peaks of some shots, the places of their points, the points of the neighbouring shots. Out: the peaks' flags;
+//! kept peaks with too few neighbours get [`Reject::Unsupported`]. Frame and unit: base frame in whole 2⁻¹⁴ mm (0.06
+//! µm), so that the same neighbours are counted on every machine.
 
 use super::params::SupportParams;
 use crate::gpu::Access::*;
@@ -10,7 +10,7 @@ use crate::stages::noise::Noise;
 use crate::stages::peak::SHARED as PEAKS;
 use crate::stages::peak::found::{Peak, Reject};
 
-/// Flags of peaks after a look at the points of the shots beside theirs; one invocation a peak.
+/// Flags of peaks after a comparison with the points of the neighbouring shots; one invocation per peak.
 pub const STAGE: Stage = Stage {
     name: "support",
     wgsl: include_str!("../../../shaders/support.wgsl"),
@@ -30,17 +30,17 @@ pub const STAGE: Stage = Stage {
     overrides: &[],
 };
 
-/// The WGSL struct of the same name.
+/// The WGSL struct of the same name, shaders/support.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct SupportFrame {
-    /// Peaks at hand.
+    /// Number of peaks.
     pub peaks: u32,
-    /// Limits of a clean peak, px.
+    /// Limits of a clean peak, px: largest sigma of the centre, smallest and largest width.
     pub sure: f32,
     pub right_low: f32,
     pub right_high: f32,
-    /// Share of the amplitude.
+    /// Share of the amplitude by which the level beside a peak may exceed the usual one.
     pub haze: f32,
     pub reserved_0: u32,
     pub reserved_1: u32,
@@ -48,7 +48,7 @@ pub struct SupportFrame {
 }
 
 impl SupportFrame {
-    /// `width_px`: the stripe's Gaussian sigma.
+    /// `width_px` is the stripe's Gaussian sigma, px.
     pub fn new(p: &SupportParams, width_px: f32) -> SupportFrame {
         SupportFrame {
             sure: p.sure * width_px,
@@ -60,41 +60,43 @@ impl SupportFrame {
     }
 }
 
-/// What the peaks of one shot need, and where its two neighbours' points lie in the list of sites.
+/// Numbers that the peaks of one shot need, and the ranges of its two neighbours' points in the list of sites.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Neighbourhood {
     pub first: [u32; 2],
     pub end: [u32; 2],
-    /// How far a neighbour may lie, 2⁻¹⁴ mm, at most 1 m; and the bits dropped so that its square fits 30 bits.
+    /// Largest distance of a neighbour, 2⁻¹⁴ mm, at most 1 m; and the number of bits dropped so that its square fits 30
+    /// bits.
     pub reach: [i32; 2],
     pub drop: [u32; 2],
-    /// Neighbours that a clean peak, a doubtful one and one in a glow need.
+    /// Number of neighbours that a clean peak, a doubtful one and one in a glow need.
     pub clean: u32,
     pub doubtful: u32,
     pub hazy: u32,
-    /// Median level beside the shot's kept peaks.
+    /// Median level beside the shot's kept peaks, grey levels.
     pub usual: f32,
 }
 
-/// A point and its place along the line.
+/// A point (x, y, z) and its position along the line.
 pub type Site = [i32; 4];
 
-/// Largest difference of two coordinates whose square counts, after the dropped bits.
+/// Differences of coordinates of at least this much, after the dropped bits, are out of reach; smaller ones can be
+/// squared.
 pub(in crate::stages) const FAR: i32 = 1 << 15;
 
-/// Whole 2⁻¹⁴ mm; what is farther than 32 m stays there.
+/// Length in whole 2⁻¹⁴ mm, clamped to 32 m.
 pub fn whole(mm: f64) -> i32 {
     (mm * 16_384.0).round().clamp(-536_870_912.0, 536_870_912.0) as i32
 }
 
-/// Reach of a neighbourhood and the bits to drop.
+/// Reach of a neighbourhood and the number of bits to drop.
 pub fn reach(mm: f64) -> (i32, u32) {
     let reach = whole(mm.clamp(0.0, 1000.0));
     (reach, (32 - reach.leading_zeros()).saturating_sub(15))
 }
 
-/// CPU twin for one peak: its flags. `shot` is its shot's entry.
+/// CPU twin for one peak: its flags. `shot` is the entry of its shot.
 pub fn judge(f: &SupportFrame, shot: &Neighbourhood, sites: &[Site], p: &Site, k: &Peak) -> u32 {
     if !k.kept() {
         return k.flags;
@@ -115,7 +117,7 @@ pub fn judge(f: &SupportFrame, shot: &Neighbourhood, sites: &[Site], p: &Site, k
             let d: [i32; 3] = std::array::from_fn(|i| (s[i] - p[i]) >> drop);
             d.iter().all(|d| d.abs() < FAR) && d.iter().map(|d| (d * d) as u32).sum::<u32>() <= r * r
         };
-        // More than are needed are not counted.
+        // Neighbours are only counted up to the number needed.
         let missing = (need - found) as usize;
         let within = sites[from..].iter().take_while(|s| s[3] <= p[3] + reach);
         found += within.filter(near).take(missing).count() as u32;
@@ -134,9 +136,9 @@ pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-/// Wavy shots with strays, doubtful and hazy peaks, refused ones; shots close together, and ones a hand apart; a
-/// lattice whose diagonals are just within reach, and one whose diagonals are the reach: 0.25, 0.1875 and 0.3125 mm
-/// are whole.
+/// Wavy shots with strays, doubtful, hazy and rejected peaks: shots close together, and shots 40 mm apart. A lattice
+/// whose diagonals are just within reach, and one whose diagonals equal the reach: 0.25, 0.1875 and 0.3125 mm are whole
+/// numbers of steps.
 pub fn cases() -> Vec<Case> {
     let exact = (0.3125f64.powi(2) - 1.44 * 0.1875f64.powi(2)).sqrt() as f32;
     [
@@ -149,7 +151,7 @@ pub fn cases() -> Vec<Case> {
     .into()
 }
 
-/// Shots `step` mm apart whose surface rises and strays by `rough` mm.
+/// Shots `step` mm apart; the surface rises, and points stray, in proportion to `rough` mm.
 fn case(name: &str, step: f64, radius: f32, rough: f64) -> Case {
     let mut noise = Noise(17);
     let p = SupportParams { radius_mm: Some(radius), ..Default::default() };
@@ -197,7 +199,7 @@ fn case(name: &str, step: f64, radius: f32, rough: f64) -> Case {
     }
 }
 
-/// What each of some shots has beside it: first and last site, and how far it looks, mm.
+/// The neighbourhood of each shot: first and last site of both neighbours, and the reach, mm.
 fn neighbourhoods(shots: &[(u32, u32)], mm: f64) -> Vec<Neighbourhood> {
     let (reach, drop) = reach(mm);
     let at = |i: i64| usize::try_from(i).ok().and_then(|i| shots.get(i)).copied().unwrap_or((0, 0));

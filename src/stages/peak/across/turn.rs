@@ -1,18 +1,18 @@
-//! In: the stripe's sigma and the lattice that its direction is taken from. Out: by how much the structure tensor's
-//! direction is to be turned. Frame and unit: sigma and lattice in px; angles in rad from the image's v axis.
-//! docs/math.md, Stripe peak (1).
+//! In: the stripe's sigma, and the lattice of grey levels from which its direction is computed. Out: the angle by which
+//! the structure tensor's direction must be turned. Frame and unit: sigma and lattice in px; angles in rad from the
+//! image's v axis. docs/math.md, Stripe peak (1).
 
-/// Angles that the correction is fitted to.
+/// Number of angles that the correction is fitted to.
 const ANGLES: usize = 12;
-/// A stripe that lies flatter than this, degrees, keeps the lattice that is longer along it; the others take a square
-/// one.
+/// Stripes up to this many degrees off the image axis keep the lattice that is longer along them; steeper ones use a
+/// square lattice.
 const FLATTEST: usize = 33;
-/// A stripe that is steeper than the last flat one by `STEEPER` degrees must be seen steeper by `APART`, rad: noise
-/// turns what is seen by two degrees.
+/// A stripe that is steeper than the last flat one by `STEEPER` degrees must seem steeper by at least `APART`, rad.
+/// Noise turns the direction of the tensor by two degrees.
 const STEEPER: usize = 5;
 const APART: f64 = 3.0 * std::f64::consts::PI / 180.0;
 
-/// Angle of the tensor's strongest direction on a straight Gaussian stripe whose normal is (sin a, cos a).
+/// Angle of the tensor's strongest direction for a straight Gaussian stripe whose normal is (sin a, cos a).
 fn seen(a: f64, s0: f64, (u, v): (i32, i32)) -> f64 {
     let (sin, cos) = a.sin_cos();
     let ratio = f64::from(v) / f64::from(u);
@@ -33,8 +33,8 @@ fn seen(a: f64, s0: f64, (u, v): (i32, i32)) -> f64 {
     0.5 * (2.0 * xy).atan2(yy - xx)
 }
 
-/// The steepest angle, rad, of a stripe that keeps the lattice `(along, across)`, and the angle that it is seen at. On
-/// stripes narrower than 0.85 px steeper angles are seen flatter: at 0.7 px, 45 degrees as 30.
+/// The steepest angle, rad, of a stripe that keeps the lattice `(along, across)`, and the angle that the tensor shows
+/// for it. On stripes narrower than 0.85 px steeper angles seem flatter: at 0.7 px, 45 degrees seem 30.
 pub(in crate::stages::peak) fn flattest(s0: f32, lattice: (i32, i32)) -> (f64, f64) {
     let seen: Vec<f64> = (0..=90).map(|a| seen(f64::from(a).to_radians(), f64::from(s0), lattice)).collect();
     let told = |a: &usize| seen[a + STEEPER..].iter().all(|steeper| *steeper > seen[*a] + APART);
@@ -42,10 +42,10 @@ pub(in crate::stages::peak) fn flattest(s0: f32, lattice: (i32, i32)) -> (f64, f
     ((last as f64).to_radians(), seen[last])
 }
 
-/// Differences over nearly three widths are no derivatives, and a lattice that is not square weighs them differently:
-/// the tensor's direction is off by up to 13 degrees, the same way on every stripe. Coefficients c of the turn sum
-/// c_k sin(k a), a the angle that was seen, for the multiples `k`; least squares over the angles from 0 to `up_to`,
-/// from the u axis where `rows`.
+/// Differences over nearly three widths are no derivatives, and a lattice that is not square weights them differently.
+/// The tensor's direction is therefore off by up to 13 degrees, equally on every stripe. Returns the coefficients c of
+/// the correction sum c_k sin(k a) for the multiples `k`, where a is the angle that the tensor shows. They are least
+/// squares over the angles from 0 to `up_to`, which count from the u axis if `rows`.
 pub(in crate::stages::peak) fn turn<const N: usize>(
     s0: f32,
     lattice: (i32, i32),
@@ -63,20 +63,20 @@ pub(in crate::stages::peak) fn turn<const N: usize>(
         normal += row * row.transpose();
         right += row * (a - seen);
     }
-    // A stripe of one pixel says the same at every angle: then nothing is turned.
+    // On a stripe of one pixel the tensor shows the same at every angle: then nothing is corrected.
     normal.cholesky().map_or([0.0; N], |c| std::array::from_fn(|j| c.solve(&right)[j] as f32))
 }
 
-/// Weights (1 - r² / 16)² of the gradients in 64ths: of the rows two above and two below the pixel, of its own, and
-/// of those one step away along both axes.
+/// Weights (1 - r² / 16)² of the gradients in 64ths: in the rows two above and two below the pixel, in its own row, and
+/// one step away along both axes.
 pub(in crate::stages) const EVEN_ROW: [i32; 3] = [16, 36, 16];
 pub(in crate::stages) const MIDDLE_ROW: [i32; 3] = [36, 64, 36];
 pub(in crate::stages) const DIAGONAL: i32 = 49;
-/// The sum of all 13.
+/// The sum of all 13 weights.
 pub(in crate::stages::peak) const WEIGHTS: f32 = (64 + 4 * 49 + 4 * 36 + 4 * 16) as f32;
 
-/// Places of the gradients and their weights: every other one of a lattice, because a gradient looks at its four
-/// neighbours, which lie on the other colour of the board.
+/// Places of the gradients and their weights. They are every other place of a lattice, like one colour of a chessboard:
+/// a gradient uses its four neighbours, which lie on the other colour.
 const GRADIENTS: [(i32, i32, i32); 13] = [
     (0, 0, MIDDLE_ROW[1]),
     (-1, -1, DIAGONAL),
@@ -93,7 +93,7 @@ const GRADIENTS: [(i32, i32, i32); 13] = [
     (2, 2, EVEN_ROW[2]),
 ];
 
-/// By how many bits gradients of a picture with this level of saturation are shortened to ten.
+/// Number of bits by which gradients of a picture with this saturation level are shortened, to ten bits.
 pub(in crate::stages::peak) fn deep(full_scale: f32) -> u32 {
     (full_scale as u32).count_ones().max(10) - 10
 }

@@ -1,23 +1,23 @@
-//! In: a picture, most of it dark or smooth. Out: by how much a dark pixel scatters.
-//! Frame and unit: standard deviation, grey levels of an 8-bit picture. docs/math.md, Stripe peak (6).
+//! In: a picture, most of it dark or smooth. Out: the standard deviation of a dark pixel. Frame and unit: grey levels
+//! of an 8-bit picture. docs/math.md, Stripe peak (6).
 
 pub(super) mod grain;
 pub(super) mod scatter;
 
 use crate::raster::Image;
 
-/// Pixels looked at, about; the median of so many is good to 1 % of the scatter.
+/// Approximate number of pixels used; the median of that many is accurate to 1 % of the scatter.
 const SAMPLES: u32 = 40_000;
 /// Median of |I - (left + right) / 2| over sigma: 0.6745 sqrt(1.5).
 const MEDIAN: f32 = 0.826;
-/// What rounding adds to the square of the scatter, levels^2.
+/// Variance that rounding adds, levels^2.
 const ROUNDING: f32 = 1.0 / 12.0;
 
 /// From second differences over two pixels, because neighbours may share a sensor's or a codec's smoothing. Their
-/// median: the stripe, edges and specks are few. Where black is cut off at 0, that many pixels scatter on one side
-/// only: the share of zeros, up to a half, puts it right to a fifth; of a picture that is mostly zeros this says too
-/// little. Whole levels stand for half a level to both sides: the median lies between them (Sheppard 1898), and what
-/// rounding adds is taken off.
+/// median is used, because stripe, edges and specks are few. If black is cut off at 0, the pixels that are cut off
+/// scatter on one side only. The share of zeros, up to a half, corrects that to a fifth; for a picture that is mostly
+/// zeros the result is too small. A whole level stands for half a level to both sides: the median lies between them
+/// (Sheppard 1898), and the variance that rounding adds is subtracted.
 pub fn noise(image: &Image) -> f32 {
     let (w, h) = (image.width, image.height);
     let step = ((w * h / SAMPLES) as f32).sqrt().max(1.0) as u32;
@@ -40,14 +40,14 @@ pub fn noise(image: &Image) -> f32 {
     (scatter * scatter - ROUNDING).max(0.0).sqrt() * cut * 255.0 / f32::from(image.full_scale())
 }
 
-/// The median of what was rounded to these numbers.
+/// The median of numbers that were rounded to these.
 fn median(numbers: &mut [u32]) -> f32 {
     let middle = numbers.len() / 2;
     let level = *numbers.select_nth_unstable(middle).1;
     let count = |of: std::cmp::Ordering| numbers.iter().filter(|n| n.cmp(&&level) == of).count() as f32;
     let (below, same) = (count(std::cmp::Ordering::Less), count(std::cmp::Ordering::Equal));
     let share = (0.5 * numbers.len() as f32 - below) / same;
-    // Numbers without sign: 0 stands for those up to a half.
+    // The numbers have no sign: 0 stands for those up to a half.
     if level == 0 { 0.5 * share } else { level as f32 - 0.5 + share }
 }
 
@@ -62,7 +62,7 @@ mod tests {
         let mut random = Noise(17);
         let full = f64::from(clean.full_scale());
         noise(&drawn(640, 480, bits, |x, y| {
-            // The stripe alone: the picture has noise of its own.
+            // Only the stripe's light: the picture `clean` has its own noise.
             let light = f64::from(clean.get(x, y));
             let light = if light > 0.2 * full { light } else { 0.0 };
             (light + (black + sigma * random.normal()) * full / 255.0).round().clamp(0.0, full) as u32
@@ -79,12 +79,13 @@ mod tests {
         }
     }
 
-    /// The threshold stands three of them above the dark: a tenth less, and five times as many specks are lit.
+    /// The threshold is three of these sigmas above the dark level: with a tenth less, five times as many specks are
+    /// lit.
     #[test]
     fn whole_grey_levels_leave_the_scatter_as_it_is() {
         for sigma in [0.7, 0.85, 1.0, 1.2, 1.5, 1.8, 2.0, 2.2, 3.1] {
             let found = f64::from(noisy(8, 30.0, sigma));
-            // The stripe's pixels are few, but there.
+            // The stripe's pixels are few, but present.
             assert!((0.99..1.07).contains(&(found / sigma)), "{sigma}: {found}");
         }
     }

@@ -1,12 +1,11 @@
-//! In: squared residuals of pixels whose light is known. Out: read noise, shot noise and speckle, which have
-//! scattered them.
-//! Frame and unit: grey levels of the picture's depth within, of an 8-bit picture in [`Scatter`]. docs/math.md,
-//! Stripe peak (6).
+//! In: squared residuals of pixels whose light is known. Out: the read noise, shot noise and speckle that caused them.
+//! Frame and unit: grey levels of the picture's depth inside, of an 8-bit picture in [`Scatter`]. docs/math.md, Stripe
+//! peak (6).
 
 use crate::stages::peak::params::PeakParams;
 use nalgebra::{Matrix3, Vector3};
 
-/// What scatters a pixel's level, as [`PeakParams`] has it.
+/// The three sources of noise of a pixel, in the units of [`PeakParams`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in super::super) struct Scatter {
     pub read_noise: f32,
@@ -14,25 +13,25 @@ pub(in super::super) struct Scatter {
     pub speckle: f32,
 }
 
-/// Least read noise in steps of the picture's levels: rounding alone has a twelfth of their square.
+/// Least read noise in steps of the picture's levels: rounding alone has a variance of a twelfth of a squared step.
 const ROUNDING: f32 = 0.3;
-/// So many pixels' worth of belief in the settings: where the light is the same everywhere, shot noise and speckle
-/// cannot be told apart.
+/// The settings count like this many pixels: if the light is the same everywhere, shot noise and speckle cannot be
+/// distinguished.
 const BELIEF: f64 = 10.0;
 
-/// A sum of squares farther out than so many of its standard deviations is not noise alone.
+/// A sum of squares that exceeds its mean by more than this many standard deviations is not noise alone.
 const SURE: f64 = 3.0;
-/// The lower quarter of a normal distribution ends so many standard deviations below its middle.
+/// The lower quarter of a normal distribution ends this many standard deviations below its mean.
 const QUARTILE: f64 = 0.674;
 
-/// Squares that noise alone leaves at most, over those that it leaves the lower quarter at most: a sum of `free`
-/// squares, in units of that, scatters by sqrt(2 / free).
+/// Largest misfit that noise alone can explain, over the upper end of the lower quarter of misfits. A sum of `free`
+/// squares has a relative standard deviation of sqrt(2 / free).
 pub(in super::super) fn most(free: f64) -> f64 {
     let scatter = (2.0 / free.max(1.0)).sqrt().min(1.0);
     (1.0 + SURE * scatter) / (1.0 - QUARTILE * scatter)
 }
 
-/// Least squares of e² against left (r² + k level + c² light²) over some pixels, each in units of its expected
+/// Sums for least squares of e² against left (r² + k level + c² light²) over some pixels, each in units of its expected
 /// variance.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in super::super) struct Sums {
@@ -44,8 +43,8 @@ pub(in super::super) struct Sums {
 }
 
 impl Sums {
-    /// A pixel of this `weight`: the shares of its variance and of its speckle's that a fit has left, its residual,
-    /// its light above the background and that, its variance as it was assumed.
+    /// Adds a pixel of this `weight`. `left` holds the shares of its variance and of its speckle's variance that remain
+    /// in the residual of a fit. `variance` is the assumed one.
     pub fn add(
         &mut self,
         weight: f32,
@@ -64,11 +63,11 @@ impl Sums {
         self.expected += weight * left;
         self.expected2 += (weight * left).powi(2);
     }
-    /// Squares over what was expected of them.
+    /// Sum of the squares over its expected value.
     pub fn misfit(&self) -> f64 {
         self.squares / self.expected.max(1e-9)
     }
-    /// As many squares of equal weight would scatter as these do.
+    /// Effective number of squares: that many of equal weight would scatter like these.
     pub fn freedom(&self) -> f64 {
         self.expected.powi(2) / self.expected2.max(1e-9)
     }
@@ -79,7 +78,8 @@ impl Scatter {
         Scatter { read_noise: p.read_noise, gain: p.gain, speckle: p.speckle }
     }
 
-    /// None is negative: one that would be is held at its least, the others follow.
+    /// Fits all sums. No result is negative: one that would be is held at its least value, and the others are solved
+    /// again.
     pub fn fit(all: &[Sums], assumed: &Scatter, full_scale: f32) -> Scatter {
         let scale = f64::from(full_scale) / 255.0;
         let [r, k, c] = [assumed.read_noise, assumed.gain, assumed.speckle].map(f64::from);
@@ -124,7 +124,7 @@ mod tests {
     use super::*;
     use crate::stages::noise::Noise;
 
-    /// Pixels of all levels, scattered by what is to be found, in another picture of 8 and of 12 bits.
+    /// Pixels of all levels, scattered with the noise to be found, in pictures of 8 and of 12 bits.
     #[test]
     fn read_shot_and_speckle_noise_are_told_apart() {
         for (bits, truth) in [
@@ -153,8 +153,8 @@ mod tests {
             let found = Scatter::fit(&sums, &assumed, full);
             let off = |a: f32, b: f32, least: f32| (a - b).abs() / b.max(least);
             assert!(off(found.speckle, truth.speckle, 0.1) < 0.15, "{found:?}, {truth:?}");
-            // What a pixel scatters by, in the dark, on the flank and on the crest, is what the fit weighs by. Where
-            // speckle drowns the other two they cannot be told apart, and need not be.
+            // The variance of a pixel in the dark, on the flank and on the crest determines the fit's weights. If
+            // speckle exceeds the other two sources, they cannot be distinguished, and need not be.
             for light in [0.0, 0.1, 0.4, 0.8].map(|share| share * full) {
                 let [seen, true_one] = [&found, &truth].map(|s| variance(s, light, 0.02 * full));
                 assert!(off(seen, true_one, 0.0) < 0.15, "light {light}: {seen} of {true_one}; {found:?}, {truth:?}");

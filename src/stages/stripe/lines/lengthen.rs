@@ -1,6 +1,5 @@
-//! In: a picture, its lit pixels and their skeleton. Out: the skeleton with its ends carried to the edge of the
-//! surface.
-//! Frame and unit: pixels; brightness is compared with the stripe's own, so no grey level is set here.
+//! In: a picture, its lit pixels and their skeleton. Out: the skeleton with its ends lengthened to the edge of the
+//! surface. Frame and unit: pixels. Brightness is relative to the stripe's own, so no setting is in grey levels.
 
 use crate::fault::{Fault, Result};
 use crate::gpu::Access::*;
@@ -12,15 +11,15 @@ use crate::stages::listing::{self, mask_index};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
-/// Thinning eats a lit streak from its ends as it does from its sides, so a skeleton stops short of the edge by half
-/// of the streak's thickness. The edge itself is where a blurred step has half of its height: an end is carried on
-/// while the picture there has at least `share` of the brightness at the end and was lit in the threshold.
+/// Thinning removes a lit streak from its ends as it does from its sides, so a skeleton ends before the edge by half of
+/// the streak's thickness. The edge is where a blurred step has half of its height. An end is lengthened while the
+/// picture there has at least `share` of the brightness at the end and was lit in the threshold.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LengthenParams {
-    /// Most pixels added to one end, in stripe widths (sigma), 0..=6; 0 is off. Thinning eats about two.
+    /// Most pixels added to one end, in stripe widths (sigma), 0..=6; 0 is off. Thinning removes about two.
     pub reach: f32,
-    /// Share of the end's brightness, 0.2..=1; 0.5 is the physical edge, less reaches into the blur beyond it.
+    /// Share of the end's brightness, 0.2..=1. 0.5 is the physical edge; less extends the line into the blur beyond it.
     pub share: f32,
 }
 
@@ -31,7 +30,7 @@ impl Default for LengthenParams {
 }
 
 impl LengthenParams {
-    /// Refuses what is out of its range.
+    /// Refuses values out of their range.
     pub fn check(&self) -> Result<()> {
         if !(0.0..=6.0).contains(&self.reach) || !(0.2..=1.0).contains(&self.share) {
             return Err(Fault::usage(format!(
@@ -42,7 +41,7 @@ impl LengthenParams {
         }
         Ok(())
     }
-    /// The setting as the stage takes it: most pixels added, and from bit 16 on the share in 4096ths.
+    /// The setting in the stage's format: most pixels added, and from bit 16 on the share in 4096ths.
     pub fn word(&self, width_px: f32) -> u32 {
         (self.reach * width_px).round() as u32 | ((4096.0 * self.share).round() as u32) << 16
     }
@@ -72,7 +71,7 @@ pub fn twin(image: &Image, lit: &Mask, skeleton: &Mask, width_px: f32, p: &Lengt
     out
 }
 
-/// Adds the pixels beyond one end, if the pixel is an end.
+/// Adds the pixels beyond an end of the skeleton; does nothing if the pixel is not an end.
 #[allow(clippy::too_many_arguments)]
 pub(in crate::stages) fn carry(
     x: i32,
@@ -86,7 +85,7 @@ pub(in crate::stages) fn carry(
 ) {
     let Some((ax, ay)) = outward(skeleton, x, y) else { return };
     let (reach, share) = ((setting & 0xffff) as i32, setting >> 16);
-    // Sum of the 3x3 pixels around one; 9 * 65535 * 4096 needs 32 bits.
+    // Sum of the 3x3 pixels around a pixel; 9 * 65535 * 4096 needs 32 bits.
     let nine = |x: i32, y: i32| -> u32 {
         (-1..=1).flat_map(|j| (-1..=1).map(move |i| (i, j))).map(|(i, j)| level(x + i, y + j)).sum()
     };
@@ -101,8 +100,8 @@ pub(in crate::stages) fn carry(
     }
 }
 
-/// The direction off the end of a line, of unit length; `None` where the pixel is no end. An end has its one or two
-/// neighbours on one side.
+/// The direction outwards from the end of a line, of unit length; `None` if the pixel is not an end. An end has one or
+/// two neighbours, all on one side.
 fn outward(skeleton: impl Fn(i32, i32) -> bool, x: i32, y: i32) -> Option<(f32, f32)> {
     let lit = |i: i32, j: i32| i32::from(skeleton(x + i, y + j));
     let (mut n, mut sx, mut sy) = (0, 0, 0);
@@ -130,7 +129,7 @@ fn outward(skeleton: impl Fn(i32, i32) -> bool, x: i32, y: i32) -> Option<(f32, 
     (length > 0.0).then(|| (ax / length, ay / length))
 }
 
-/// Copies the listed tiles of the skeleton, to be added to.
+/// Copies the listed tiles of the skeleton, to which pixels are added.
 pub const COPY: Stage = Stage {
     name: "skeleton_copy",
     wgsl: include_str!("../../../../shaders/skeleton_copy.wgsl"),
@@ -147,7 +146,7 @@ pub const COPY: Stage = Stage {
     overrides: &[PX_LOG2],
 };
 
-/// A copy of the thinned mask, to be carried on.
+/// Copies the thinned mask, whose lines are then lengthened.
 pub const COPYING: Step = Step {
     stage: &COPY,
     twin: copy_twin,
@@ -156,7 +155,7 @@ pub const COPYING: Step = Step {
     same: Same::Words,
 };
 
-/// Adds the ends. Only lit pixels are added, so they lie in listed tiles.
+/// Lengthens the ends. Only lit pixels are added, so they lie in listed tiles.
 pub const STAGE: Stage = Stage {
     name: "lengthen",
     wgsl: include_str!("../../../../shaders/lengthen.wgsl"),
@@ -173,7 +172,7 @@ pub const STAGE: Stage = Stage {
     ..COPY
 };
 
-/// Carries the ends of lines on.
+/// Lengthens the ends of lines.
 pub const STEP: Step = Step {
     stage: &STAGE,
     twin: stage_twin,
@@ -253,7 +252,7 @@ mod tests {
         let thin = thin::twin(&lit, Thinning::ZhangSuen);
         let last = |m: &Mask| skeleton::twin(m).iter().map(|p| p & 0xffff).max().unwrap();
         let long = twin(&image, &lit, &thin, 1.5, &LengthenParams { reach: 4.0, share: 0.5 });
-        // Half of the brightness is at the edge; the lit area goes on into the blur.
+        // The edge has half of the brightness; the lit area continues into the blur.
         assert!(last(&thin) <= 60 && (59..=61).contains(&last(&long)), "{} {}", last(&thin), last(&long));
         assert!(thin.words.iter().zip(&long.words).all(|(t, l)| t & !l == 0), "nothing is taken away");
         let off = twin(&image, &lit, &thin, 1.5, &LengthenParams { reach: 0.0, share: 0.5 });

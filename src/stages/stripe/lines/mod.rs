@@ -1,5 +1,5 @@
-//! In: the skeleton's lines. Out: their ends carried on; what of their pixels is fitted.
-//! Frame and unit: pixels.
+//! In: the skeleton's lines. Out: the lines with their ends lengthened; the pixels of them that are fitted. Frame and
+//! unit: pixels.
 
 pub mod lengthen;
 pub mod spacing;

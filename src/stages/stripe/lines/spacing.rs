@@ -1,6 +1,6 @@
-//! In: the skeleton, lit pixels. Out: of each run of its pixels across the stripe the one in the middle, and every so
-//! many from it; a run's pixels follow one another within that distance. Lit pixels with no company are left out.
-//! Frame and unit: pixels; the distance follows from the stripe's width.
+//! In: the skeleton, lit pixels. Out: of each run of skeleton pixels across the stripe, the middle pixel and every
+//! pixel at a multiple of the spacing from it. The pixels of a run are at most the spacing apart. Isolated lit pixels
+//! are excluded. Frame and unit: pixels; the spacing follows from the stripe's width.
 
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Stage};
@@ -12,42 +12,42 @@ use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 use glam::Vec2;
 
-/// A run that goes on for longer has no middle that can be found from here: its pixels are counted from the picture's
-/// border.
+/// If a run continues for longer than this, px, its middle cannot be found from here: its pixels are counted from the
+/// picture's border.
 pub(in crate::stages) const FAR: i32 = 32;
 
-/// Bit of the setting: a lit pixel with no other one near is no stripe's.
+/// Bit of the setting: isolated lit pixels are excluded, because they do not belong to a stripe.
 ///
-/// One dark pixel in 740 exceeds three standard deviations of its noise. At 12 million pixels those are 17,000 fits,
-/// four times those of a stripe; 94 % of them have no other within three columns and rows. A stripe lights its pixels
-/// along itself: where the brightest of a column are lit in no more than half of the cases, six neighbours along it
-/// leave one in 64 by itself, and its flanks fewer.
+/// One dark pixel in 740 exceeds three standard deviations of its noise. At 12 million pixels these are 17,000 fits,
+/// four times those of a stripe. 94 % of them have no other lit pixel within three columns and rows. A stripe lights
+/// neighbouring pixels along it. Even if the brightest pixels of its columns are lit in only half of the cases, six
+/// neighbours along it leave only one in 64 isolated. The flanks add neighbours.
 pub const COMPANY: u32 = 1 << 17;
-/// Columns and rows on either side in which company is sought.
+/// Columns and rows on either side in which another lit pixel is searched.
 pub(in crate::stages) const NEAR: i32 = 3;
 
-/// Up to here a skeleton hardly winds: 1.00 to 1.02 points a column.
+/// Up to this width, px, a skeleton hardly winds: 1.00 to 1.02 points per column.
 const NARROW_PX: f32 = 2.0;
 
-/// The setting as the stage takes it: pixels from one to the next, and from bit 16 on whether runs are sought along
-/// rows; 0 is off. [`COMPANY`] is a matter of its own.
+/// The setting in the stage's format: spacing in pixels, and from bit 16 on whether runs lie along rows; 0 is off.
+/// [`COMPANY`] is set separately.
 ///
-/// Speckle makes the skeleton of a wide stripe wind and branch. Its pixels across the stripe see the same light, so
-/// their fits find the same centre once more (at 4 px of sigma 1.9 points a column; every 1.5 widths leaves 1.1). A
-/// stripe narrower than 2 px keeps every pixel. `across`: unit image direction of depth.
+/// Speckle makes the skeleton of a wide stripe wind and branch. Its pixels across the stripe use the same light, so
+/// their fits find the same centre again: at a sigma of 4 px there are 1.9 points per column. With a spacing of 1.5
+/// widths, 1.1 remain. A stripe narrower than 2 px keeps every pixel. `across` is the unit image direction of depth.
 pub fn word(widths: f32, width_px: f32, across: Vec2) -> u32 {
     let step = (widths * width_px).floor();
     let rows = across[1].abs() < across[0].abs();
     if width_px < NARROW_PX || step < 2.0 { 0 } else { step.min(65535.0) as u32 | u32::from(rows) << 16 }
 }
 
-/// Whether a pixel of the skeleton is kept. `skeleton` tells pixels, beyond the picture none is lit.
+/// Whether a pixel of the skeleton is kept. `skeleton` says whether a pixel is set; beyond the picture none is.
 pub(in crate::stages) fn kept(x: i32, y: i32, setting: u32, skeleton: impl Fn(i32, i32) -> bool) -> bool {
     let (step, rows) = ((setting & 0xffff) as i32, (setting >> 16 & 1) as i32);
     if step == 0 {
         return true;
     }
-    // Pixels of the run on one side; it ends where none follows within `step`.
+    // Pixels of the run on one side; the run ends if no pixel follows within `step`.
     let beyond = |du: i32, dv: i32| {
         let (mut found, mut last) = (0, 0);
         for k in 1..=FAR {
@@ -68,7 +68,8 @@ pub(in crate::stages) fn kept(x: i32, y: i32, setting: u32, skeleton: impl Fn(i3
     place % step == 0
 }
 
-/// Whether another pixel near one is lit, where that is asked for. `lit` tells pixels, beyond the picture none is lit.
+/// Whether another pixel near this one is lit; true without [`COMPANY`]. `lit` says whether a pixel is lit; beyond the
+/// picture none is.
 fn in_company(x: i32, y: i32, setting: u32, lit: impl Fn(i32, i32) -> bool) -> bool {
     let mut around = (-NEAR..=NEAR).flat_map(|dy| (-NEAR..=NEAR).map(move |dx| (dx, dy)));
     setting & COMPANY == 0 || around.any(|(dx, dy)| (dx, dy) != (0, 0) && lit(x + dx, y + dy))
@@ -85,7 +86,8 @@ pub fn twin(lit: &Mask, skeleton: &Mask, setting: u32) -> Mask {
     })
 }
 
-/// Lines that were carried on count: the end of a branch is carried on across the stripe.
+/// Thins the skeleton across the stripe. Lengthened lines count too, because the end of a branch is lengthened across
+/// the stripe.
 pub const STAGE: Stage = Stage {
     name: "spacing",
     wgsl: include_str!("../../../../shaders/spacing.wgsl"),
@@ -103,7 +105,7 @@ pub const STAGE: Stage = Stage {
     overrides: &[PX_LOG2],
 };
 
-/// One fit a crossing of a wide stripe.
+/// Leaves one fit for each column of a wide stripe.
 pub const STEP: Step = Step {
     stage: &STAGE,
     twin: stage_twin,
@@ -142,12 +144,12 @@ mod tests {
     use super::*;
     use crate::stages::stripe::skeleton::twin as skeletons;
 
-    /// Row and column of what is kept of a column of lit rows.
+    /// The rows that are kept of a column in which `rows` are lit.
     fn of_column(rows: std::ops::Range<u32>, step: u32) -> Vec<u32> {
         let (line, setting) = (rows, word(1.0, step as f32, Vec2::new(0.0, 1.0)));
         let column = Mask::from_fn(9, 200, |x, y| x == 4 && line.contains(&y));
         let kept = twin(&column, &column, setting);
-        // Upright it is the same.
+        // The same for a line along a row.
         let upright = Mask::from_fn(200, 9, |x, y| y == 4 && line.contains(&x));
         assert_eq!(setting | 1 << 16, word(1.0, step as f32, Vec2::new(-1.0, 0.1)));
         let turned = twin(&upright, &upright, setting | 1 << 16);
@@ -168,12 +170,12 @@ mod tests {
         };
         assert_eq!((4, 9), (word(1.0, 4.0, Vec2::new(0.0, 1.0)), skeletons(&two(4)).len()));
         assert_eq!(18, skeletons(&two(5)).len());
-        // A run with no end in sight, as of a steep face, is sampled as finely.
+        // A run without an end within reach, as on a steep face, is sampled with the same spacing.
         assert!(of_column(20..180, 3).windows(2).filter(|w| w[1] - w[0] == 3).count() >= 50);
     }
 
-    /// Company is what is lit, not what is left of it: a blob thins to one pixel. At the border nothing beyond it
-    /// counts.
+    /// Lit pixels count as neighbours, not skeleton pixels: a blob is thinned to one pixel. At the border nothing
+    /// beyond it counts.
     #[test]
     fn lit_pixels_by_themselves_are_left_out() {
         let pixels = |places: &'static [(u32, u32)]| Mask::from_fn(40, 30, |x, y| places.contains(&(x, y)));
