@@ -79,7 +79,7 @@ pub struct CalibrationState {
 pub struct RecordingInfo {
     /// Path below the recordings' folder.
     pub name: String,
-    /// Its title.
+    /// The name stated in its meta.json.
     pub set: String,
     /// Number of frames.
     pub frames: usize,
