@@ -17,7 +17,6 @@ const WORKSPACE: Space = Space { from_mm: [150.0, -350.0, 200.0], to_mm: [650.0,
 ///
 /// # Errors
 /// A file cannot be written.
-/// A file cannot be written.
 pub fn station_for(cell: &Cell, folder: &Path, name: &str, silence_ms: Option<f64>) -> Result<()> {
     crate::files::make_folder(folder)?;
     cell.station().calibrations(cell.base_from_camera()).store_all(folder)?;

@@ -24,7 +24,7 @@ pub enum JobState {
     CutOff,
 }
 
-/// What to do where the disk is full.
+/// What to do if the disk is full.
 const MAKE_ROOM: &str = "take old jobs away on the page Replay (the × behind each), or free space otherwise; then \
                          resume this job, or order it again";
 

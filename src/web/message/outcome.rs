@@ -58,7 +58,7 @@ pub struct CheckLine {
     pub group: String,
     /// What was checked.
     pub name: String,
-    /// good, poor (works, but read it), bad or absent.
+    /// good, poor (works, but read the finding), bad or absent.
     pub state: String,
     /// The finding, with the value and the limit.
     pub says: String,
