@@ -42,7 +42,7 @@ impl Clock {
         self.of(&self.since())
     }
 
-    /// Stops the cell's time until all holders have dropped their [`Held`].
+    /// Stops the cell's time until all holders have dropped their `Held`.
     pub fn hold(&self) -> Held<'_> {
         let mut since = self.since();
         since.cell = self.of(&since);
