@@ -1,7 +1,7 @@
-//! In: what is asked of a controller. Out: the number of the call on the wire, and its name.
+//! In: a call to make to a controller. Out: the number of the call on the wire, and its name.
 //! Frame and unit: none. Numbers: Denso's b-CAP function ids, as its client library sends them.
 
-/// Writes the enum, its numbers and its names once.
+/// Defines the enum, its numbers and its names in one place.
 macro_rules! calls {
     ($($name:ident = $id:literal $words:literal,)*) => {
         /// The calls that a controller answers.
@@ -11,9 +11,9 @@ macro_rules! calls {
             $(#[doc = concat!("Denso's `", $words, "`.")] $name = $id,)*
         }
         impl Call {
-            /// All of them, ascending by number.
+            /// All calls, ascending by number.
             pub const ALL: &[Call] = &[$(Call::$name,)*];
-            /// As Denso's documents write it.
+            /// The name in Denso's documents.
             pub fn name(self) -> &'static str {
                 match self {
                     $(Call::$name => $words,)*
@@ -47,11 +47,11 @@ calls! {
 }
 
 impl Call {
-    /// As a request carries it.
+    /// The number that a request carries.
     pub fn number(self) -> u32 {
         self as u32
     }
-    /// The call of a request; `None` for calls that no one here makes or answers.
+    /// The call with this number; `None` for calls that Sheetlight neither makes nor answers.
     pub fn of(number: u32) -> Option<Call> {
         Call::ALL.iter().copied().find(|c| c.number() == number)
     }

@@ -1,21 +1,22 @@
-//! In: a controller's address and calls. Out: what the controller answers; no wait is longer than it was told.
-//! Frame and unit: as the controller writes them: mm and degrees, Denso's notation.
+//! In: a controller's address and calls. Out: the controller's answers; no wait exceeds its configured limit.
+//! Frame and unit: as the controller writes them: mm and degrees, in Denso's notation.
 
 use super::{Call, Exchange, Heard, Link, Network, Outcome, Variant};
 use crate::fault::{Fault, Result};
 use std::time::{Duration, Instant};
 
-/// How a connection waits.
+/// Waiting times of a connection.
 #[derive(Clone, Copy, Debug)]
 pub struct ClientOptions {
-    /// How frames travel; TCP unless stated.
+    /// Transport of the frames; TCP unless stated.
     pub network: Network,
-    /// Longest silence within a call. Interim replies of this call are no silence, frames of others are.
+    /// Longest silence within a call. Interim replies of this call end a silence, frames of other calls do not.
     pub patience: Duration,
-    /// After how long a datagram is sent again.
+    /// Time after which an unanswered datagram is sent again.
     pub repeat: Duration,
-    /// The controller's interim replies come at this distance, ms, 80 or more; and how long it lets a call take, ms.
-    /// `None` leaves both to the controller: then there are none, and a motion must end within `patience`.
+    /// Interval of the controller's interim replies, ms, at least 80; and the time limit that the controller sets
+    /// for a call, ms. `None` leaves both to the controller: it sends no interim replies, and a motion must end
+    /// within `patience`.
     pub watchdog_ms: Option<(u32, u32)>,
 }
 
@@ -30,11 +31,12 @@ impl Default for ClientOptions {
     }
 }
 
-/// An object of the controller: itself, a robot or a variable. Belongs to the connection that it came from.
+/// An object of the controller: the controller itself, a robot or a variable. Valid only on the connection that
+/// returned it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Handle(pub i32);
 
-/// One connection with its service started.
+/// One connection with the service started.
 pub struct Client {
     link: Link,
     exchange: Exchange,
@@ -42,7 +44,7 @@ pub struct Client {
 }
 
 impl Client {
-    /// Opens `host:port`; the first call must be the start of the service.
+    /// Opens `host:port`; the first call must start the service.
     pub fn open(address: &str, options: ClientOptions) -> Result<Client> {
         let link = Link::open(address, options.network, options.patience)?;
         Ok(Client { link, exchange: Exchange::new(options.network == Network::Udp), options })
@@ -59,8 +61,8 @@ impl Client {
         Ok(client)
     }
 
-    /// Makes a call and waits for its answer. The inner result is the controller's: a value ([`Variant::Empty`] where
-    /// the call has none) or its refusal. Errors: silence, a closed connection, damage.
+    /// Makes a call and waits for its answer. The inner result is the controller's: a value ([`Variant::Empty`] if
+    /// the call returns none) or its refusal. Returns an error on silence, a closed connection or damaged data.
     pub fn call(&mut self, call: Call, arguments: Vec<Variant>) -> Result<std::result::Result<Variant, Outcome>> {
         let request = self.exchange.begin(call, arguments)?;
         self.link.send(&request)?;
@@ -75,7 +77,7 @@ impl Client {
                 Some(Heard::Answer(_, values)) => return Ok(Ok(values.into_iter().next().unwrap_or(Variant::Empty))),
                 Some(Heard::Interim) => {
                     silent_since = Instant::now();
-                    // It is at work: what would be repeated has arrived.
+                    // The controller is at work, so the request has arrived and need not be repeated soon.
                     repeat_at = silent_since + self.options.patience / 2;
                 }
                 Some(Heard::Foreign) => {}
@@ -109,7 +111,7 @@ impl Client {
         Fault::device(format!("{at}: no answer to {} within {patience} ms", call.name())).cause(cause).next(next)
     }
 
-    /// Makes a call that must succeed; a refusal is a fault with the controller's code and what it means.
+    /// Makes a call that must succeed. A refusal becomes a fault with the controller's code and its meaning.
     pub fn ask(&mut self, call: Call, arguments: Vec<Variant>) -> Result<Variant> {
         self.call(call, arguments)?.map_err(|outcome| self.refused(call, outcome))
     }
@@ -142,18 +144,18 @@ impl Client {
         self.handle(Call::ControllerConnect, names.map(|n| Variant::Text(n.into())).to_vec())
     }
 
-    /// Its arm.
+    /// The controller's arm.
     pub fn robot(&mut self, controller: Handle) -> Result<Handle> {
         self.handle(Call::ControllerGetRobot, vec![controller.into(), text("Arm"), text("")])
     }
 
-    /// A command of a robot with its argument, as the controller's manual lists them.
+    /// Executes a command of the robot with its argument, as listed in the controller's manual.
     pub fn execute(&mut self, robot: Handle, command: &str, argument: Variant) -> Result<Variant> {
         let place = |e: Fault| e.at(command);
         self.ask(Call::RobotExecute, vec![robot.into(), text(command), argument]).map_err(place)
     }
 
-    /// The value of a variable of the controller (`get` = [`Call::ControllerGetVariable`]) or a robot.
+    /// The value of a variable of the controller (`get` = [`Call::ControllerGetVariable`]) or of a robot.
     pub fn read(&mut self, get: Call, owner: Handle, name: &str) -> Result<Variant> {
         let variable = self.handle(get, vec![owner.into(), text(name), text("")]).map_err(|e| e.at(name))?;
         let value = self.call(Call::VariableGetValue, vec![variable.into()])?;
@@ -169,7 +171,7 @@ impl Client {
         done.map(|_| ()).map_err(|outcome| self.refused(Call::VariablePutValue, outcome).at(name))
     }
 
-    /// Gives robot and controller back and ends the service.
+    /// Releases robot and controller and ends the service.
     pub fn close(mut self, controller: Handle, robot: Option<Handle>) -> Result<()> {
         if let Some(robot) = robot {
             self.ask(Call::RobotRelease, vec![robot.into()])?;
@@ -185,7 +187,7 @@ fn text(s: &str) -> Variant {
 }
 
 impl From<Handle> for Variant {
-    /// I4: with any other type Denso's library answers and leaves the handle 0.
+    /// Encoded as I4: for any other type Denso's library answers and leaves the handle 0.
     fn from(handle: Handle) -> Variant {
         Variant::I32(handle.0)
     }

@@ -1,44 +1,45 @@
-//! In: one call after the other, and every frame that comes in. Out: the bytes to send, and what each frame is to the
-//! call. No I/O and no clock: who owns the socket decides when to repeat and when to give up.
+//! In: one call after the other, and every frame that arrives. Out: the bytes to send, and the role of each frame
+//! in the call. No I/O and no clock: the owner of the socket decides when to repeat and when to give up.
 //! Frame and unit: none. Rules as captured from Denso's client: docs/robots.md, b-CAP.
 
 use super::{Call, Frame, Outcome, Variant};
 use crate::fault::Result;
 
-/// What a frame is to the call that is under way.
+/// The role of a frame in the call that is under way.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Heard {
-    /// The call is at work; the answer follows.
+    /// The call is in progress; the answer follows.
     Interim,
-    /// A late answer to another call, or noise. It says nothing about this one.
+    /// A late answer to another call, or noise. It does not concern this call.
     Foreign,
-    /// The answer to this call: how it went, and the values that came with it.
+    /// The answer to this call: the outcome, and the returned values.
     Answer(Outcome, Vec<Variant>),
 }
 
-/// The serials of one connection and the call that is under way on it.
+/// The serial numbers of one connection and the call that is under way on it.
 #[derive(Debug)]
 pub struct Exchange {
     datagrams: bool,
     last: u16,
-    /// The request as it was sent last, and the serials of all its sendings.
+    /// The request as last sent; `sendings` has the serials of all its transmissions.
     request: Frame,
     sendings: Vec<u16>,
 }
 
 impl Exchange {
-    /// `datagrams`: requests name their first sending, so that a repeated one is not done twice.
+    /// `datagrams`: requests carry the serial of their first transmission, so that the controller does not execute
+    /// a repeated one twice.
     pub fn new(datagrams: bool) -> Exchange {
         Exchange { datagrams, last: 0, request: Frame::default(), sendings: Vec::new() }
     }
 
-    /// The next serial; 0 is none.
+    /// The next serial; 0 is not used.
     fn serial(&mut self) -> u16 {
         self.last = self.last.checked_add(1).unwrap_or(1);
         self.last
     }
 
-    /// Begins a call. Answers to the one before are foreign from now on.
+    /// Begins a call. Answers to the previous call are foreign from now on.
     pub fn begin(&mut self, call: Call, arguments: Vec<Variant>) -> Result<Vec<u8>> {
         let serial = self.serial();
         let first_serial = if self.datagrams { serial } else { 0 };
@@ -47,14 +48,15 @@ impl Exchange {
         self.request.encode()
     }
 
-    /// The same call once more, under a new serial and the first one's name: it is done once.
+    /// The same call again, under a new serial and with the serial of its first transmission, so that it is
+    /// executed once.
     pub fn again(&mut self) -> Result<Vec<u8>> {
         self.request.serial = self.serial();
         self.sendings.push(self.request.serial);
         self.request.encode()
     }
 
-    /// Sorts a frame that came in. An answer ends the call: a second one is foreign.
+    /// Classifies a frame that arrived. An answer ends the call: a second answer is foreign.
     pub fn hear(&mut self, reply: Frame) -> Heard {
         if !self.sendings.contains(&reply.serial) {
             return Heard::Foreign;

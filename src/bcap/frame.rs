@@ -1,36 +1,37 @@
-//! In: a stream of bytes, or a datagram. Out: whole b-CAP frames, requests and replies, and back to the same bytes.
+//! In: a stream of bytes, or a datagram. Out: whole b-CAP frames, requests and replies; and the same bytes again.
 //! Layout: 0x01, length u32, serial u16, field 7 u16, call or HRESULT u32, argument count u16, arguments (each a
 //! length u32 and a variant), 0x04. Frame and unit: bytes, little endian.
 
 use super::Variant;
 use crate::fault::{Fault, Result};
 
-/// Longest frame that is read. Poses, variables and texts of error lists have some hundred bytes; a longer claim is
-/// damage.
+/// Longest frame that is read. Poses, variables and error texts have some hundred bytes; a longer stated length
+/// means damaged data.
 pub const LARGEST_FRAME: usize = 1 << 20;
 
 const BEGIN: u8 = 1;
 const END: u8 = 4;
-/// Bytes before the arguments, and with the last byte.
+/// Number of bytes before the arguments; `SHORTEST` adds the last byte.
 const HEAD: usize = 15;
 const SHORTEST: usize = HEAD + 1;
 
-/// A request or a reply; both have one layout.
+/// A request or a reply; both have the same layout.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frame {
-    /// Number of the sending; a reply carries that of its request.
+    /// Serial number of the transmission; a reply carries that of its request.
     pub serial: u16,
-    /// Field 7. Requests over UDP: serial of the first sending of this call, its own if it is the first. Otherwise 0.
+    /// Field 7. Requests over UDP: serial of this call's first transmission, equal to `serial` for the first one.
+    /// Otherwise 0.
     pub first_serial: u16,
     /// Requests: the call's number; replies: the HRESULT.
     pub number: u32,
-    /// Requests: what the call is given; replies: what it returns. In the call's own order.
+    /// Requests: the call's arguments; replies: its results. In the order that the call defines.
     pub arguments: Vec<Variant>,
 }
 
 impl Frame {
-    /// Reads one frame that fills `bytes`. Errors: lengths that disagree, missing first or last byte, arguments that
-    /// cannot be read ([`Variant::decode`]).
+    /// Reads one frame that fills `bytes`. Returns an error if lengths disagree, the first or last byte is wrong,
+    /// or an argument cannot be read ([`Variant::decode`]).
     pub fn decode(bytes: &[u8]) -> Result<Frame> {
         let length = length_of(bytes)?.unwrap_or(usize::MAX);
         if length != bytes.len() {
@@ -57,7 +58,8 @@ impl Frame {
         Ok(Frame { serial: u16_at(5), first_serial: u16_at(7), number: u32_at(&bytes[9..]), arguments })
     }
 
-    /// The bytes of the frame. Errors: more than 65,535 arguments, or longer than [`LARGEST_FRAME`].
+    /// The bytes of the frame. Returns an error for more than 65,535 arguments, or more than [`LARGEST_FRAME`]
+    /// bytes.
     pub fn encode(&self) -> Result<Vec<u8>> {
         let mut out = vec![BEGIN, 0, 0, 0, 0];
         out.extend(self.serial.to_le_bytes());
@@ -87,7 +89,7 @@ impl Frame {
     }
 }
 
-/// The length that the first bytes of a frame state; `None` while fewer than five are there.
+/// The length stated by the first bytes of a frame; `None` while fewer than five bytes are available.
 fn length_of(bytes: &[u8]) -> Result<Option<usize>> {
     match bytes.first() {
         Some(&BEGIN) | None => {}
@@ -111,18 +113,19 @@ fn spoilt(what: String) -> Fault {
         .next("check the address and the port (b-CAP: 5007)")
 }
 
-/// Puts frames together from the pieces in which a stream delivers them.
+/// Assembles frames from the pieces that a stream delivers.
 #[derive(Debug, Default)]
 pub struct Splitter {
     bytes: Vec<u8>,
 }
 
 impl Splitter {
-    /// Takes what came.
+    /// Adds received bytes.
     pub fn push(&mut self, bytes: &[u8]) {
         self.bytes.extend(bytes);
     }
-    /// The next whole frame; `None` until more bytes come. After an error the stream has lost its place: close it.
+    /// The next whole frame; `None` until more bytes arrive. After an error the frame boundaries are lost: close
+    /// the stream.
     pub fn next(&mut self) -> Result<Option<Frame>> {
         match length_of(&self.bytes)? {
             Some(length) if length <= self.bytes.len() => {
@@ -133,7 +136,7 @@ impl Splitter {
             _ => Ok(None),
         }
     }
-    /// Bytes of a frame that is not whole yet.
+    /// Number of bytes of a frame that is not complete yet.
     pub fn waiting(&self) -> usize {
         self.bytes.len()
     }

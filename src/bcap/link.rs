@@ -1,4 +1,4 @@
-//! In: an address and frames to send. Out: frames that came, over TCP or UDP, each wait with an end.
+//! In: an address and frames to send. Out: frames received over TCP or UDP; each wait has a time limit.
 //! Frame and unit: bytes; times are instants.
 
 use super::{Frame, Splitter};
@@ -7,19 +7,19 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream, ToSocketAddrs, UdpSocket};
 use std::time::{Duration, Instant};
 
-/// How frames travel. TCP unless the controller is set to UDP: there, all clients of Denso's library share one
-/// thread, so that a Halt waits for the motion.
+/// Transport of the frames. Use TCP unless the controller is set to UDP: with UDP, all clients of Denso's library
+/// share one thread, so that a Halt waits for the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Network {
     /// A stream; frames of any length.
     Tcp,
-    /// Datagrams; a request has at most 503 bytes and is sent again where no answer comes.
+    /// Datagrams; a request has at most 503 bytes and is sent again if no answer comes.
     Udp,
 }
 
-/// Longest datagram: Denso's UDP service ends for good at a longer one.
+/// Longest datagram: Denso's UDP service stops for good when it receives a longer one.
 const LONGEST_DATAGRAM: usize = 503;
-/// Shortest wait that a socket takes; 0 would mean for ever.
+/// Shortest timeout that a socket accepts; 0 would wait without limit.
 const SHORTEST_WAIT: Duration = Duration::from_millis(1);
 
 enum Socket {
@@ -34,7 +34,7 @@ pub struct Link {
 }
 
 impl Link {
-    /// Opens `host:port`. TCP fails here where nothing listens; UDP with the first call.
+    /// Opens `host:port`. TCP fails here if nothing listens; UDP fails at the first call.
     pub fn open(address: &str, network: Network, patience: Duration) -> Result<Link> {
         let mut last = None;
         let all = address.to_socket_addrs().map_err(|e| {
@@ -72,12 +72,12 @@ impl Link {
         Ok(Link { address: at, socket })
     }
 
-    /// The controller's, as it was resolved.
+    /// The controller's address, as resolved.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Sends the bytes of one frame. Over UDP more than 503 bytes are refused.
+    /// Sends the bytes of one frame. Over UDP, more than 503 bytes are an error.
     pub fn send(&mut self, bytes: &[u8]) -> Result<()> {
         let sent = match &mut self.socket {
             Socket::Tcp(stream, _) => stream.write_all(bytes),
@@ -94,8 +94,8 @@ impl Link {
         sent.map_err(|e| closed(self.address, &e))
     }
 
-    /// The next frame; `None` when `until` has come. A damaged datagram is passed over; a damaged stream is an error,
-    /// because its place is lost.
+    /// The next frame; `None` once `until` has passed. A damaged datagram is skipped. A damaged stream is an error,
+    /// because the frame boundaries are lost.
     pub fn receive(&mut self, until: Instant) -> Result<Option<Frame>> {
         let mut buffer = [0; 4096];
         loop {

@@ -1,4 +1,4 @@
-//! In: calls to a Denso robot controller. Out: b-CAP frames on the wire, and what came back of them.
+//! In: calls to a Denso robot controller. Out: b-CAP frames on the wire, and the answers to the calls.
 //! Both ends use the same pure parts (variant, frame, call, exchange); only `link` and `client` do I/O.
 //! Frame and unit: bytes, little endian; poses and joints as the controller writes them (mm, degrees).
 

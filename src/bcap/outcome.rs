@@ -1,5 +1,5 @@
-//! In: the HRESULT of a reply. Out: whether the call went well, and in words what it means.
-//! Frame and unit: none. Codes: Denso's client code, the controller's error tables as far as they are public.
+//! In: the HRESULT of a reply. Out: whether the call succeeded, and the meaning in words.
+//! Frame and unit: none. Codes: Denso's client code, and the public part of the controller's error tables.
 
 use std::fmt;
 
@@ -8,9 +8,9 @@ use std::fmt;
 pub struct Outcome(pub u32);
 
 impl Outcome {
-    /// The call went well.
+    /// The call succeeded.
     pub const OK: Outcome = Outcome(0);
-    /// No answer yet: the call is under way. Comes after each `WDT` milliseconds.
+    /// No answer yet: the call is under way. Sent every `WDT` milliseconds.
     pub const INTERIM: Outcome = Outcome(0x0000_0900);
     /// The controller does not have this call.
     pub const NOT_IMPLEMENTED: Outcome = Outcome(0x8000_4001);
@@ -24,7 +24,7 @@ impl Outcome {
     pub const NOT_STARTED: Outcome = Outcome(0x8000_0902);
     /// The controller does not know this command.
     pub const UNKNOWN_COMMAND: Outcome = Outcome(0x8000_0904);
-    /// The controller wants a value of another type.
+    /// The controller expects a value of another type.
     pub const BAD_TYPE: Outcome = Outcome(0x8002_0005);
     /// The controller does not know this object any more.
     pub const BAD_HANDLE: Outcome = Outcome(0x8007_0006);
@@ -43,11 +43,11 @@ impl Outcome {
     pub fn failed(self) -> bool {
         self.0 >= 0x8000_0000
     }
-    /// As controllers carry it in an I4.
+    /// From the I4 in which controllers send it.
     pub fn from_i32(code: i32) -> Outcome {
         Outcome(code as u32)
     }
-    /// What it means and what to do, where that is known.
+    /// The meaning and what to do, if known.
     pub fn words(self) -> Option<(&'static str, &'static str)> {
         Some(match self {
             Outcome::NOT_IMPLEMENTED => ("the controller does not have this call", "use another controller version"),

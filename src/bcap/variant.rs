@@ -1,10 +1,10 @@
-//! In: bytes of a b-CAP argument. Out: a variant as OLE Automation names them, and back to the same bytes.
+//! In: bytes of a b-CAP argument. Out: a variant, named as in OLE Automation; and the same bytes again.
 //! Layout: type u16, count u32, then the values, little endian; texts are a byte count and UTF-16.
-//! Frame and unit: none. Nothing is allocated before the bytes for it have been seen.
+//! Frame and unit: none. Memory is allocated only for bytes that are present.
 
 use crate::fault::{Fault, Result};
 
-/// Arrays of variants inside arrays of variants, at most. The deepest that Denso's library sends is 2.
+/// Deepest nesting of arrays of variants. The deepest that Denso's library sends is 2.
 pub const DEEPEST: usize = 16;
 
 const ARRAY: u16 = 0x2000;
@@ -14,7 +14,7 @@ const TEXT: u16 = 8;
 const BOOL: u16 = 11;
 const VARIANT: u16 = 12;
 
-/// Writes the enum, and for each plain number type how it is read and written.
+/// Defines the enum, and for each plain number type how it is read and written.
 macro_rules! variants {
     ($($(#[$doc:meta])* $one:ident, $many:ident, $number:ty, $code:literal;)*) => {
         /// An argument of a call or a reply: nothing, a value, or an array of values of one type.
@@ -22,17 +22,17 @@ macro_rules! variants {
         pub enum Variant {
             /// Nothing.
             Empty,
-            /// A value that says that there is none.
+            /// The null value.
             Null,
             /// UTF-16 on the wire; half a surrogate pair arrives as U+FFFD.
             Text(String),
             /// An array of texts.
             Texts(Vec<String>),
-            /// 0 or -1 in two bytes; whatever is not 0 is true.
+            /// 0 or -1 in two bytes; every value other than 0 is true.
             Bool(bool),
             /// An array of truth values.
             Bools(Vec<bool>),
-            /// An array whose values have types of their own.
+            /// An array whose values have different types.
             Variants(Vec<Variant>),
             $(
                 $(#[$doc])* $one($number),
@@ -42,7 +42,7 @@ macro_rules! variants {
         }
 
         impl Variant {
-            /// The values of a plain number type, or `None` where the type is no number.
+            /// The values of a plain number type; `None` if the type is not a number.
             fn numbers(kind: u16, count: u32, from: &mut Bytes) -> Result<Option<Variant>> {
                 Ok(Some(match kind {
                     $($code => Variant::$one(from.numbers::<$number>(1)?[0]),)*
@@ -79,9 +79,9 @@ trait Number: Sized {
 }
 
 variants! {
-    /// A whole number of 16 bits.
+    /// A signed integer of 16 bits.
     I16, I16s, i16, 2;
-    /// A whole number of 32 bits.
+    /// A signed integer of 32 bits.
     I32, I32s, i32, 3;
     /// A number of single precision.
     F32, F32s, f32, 4;
@@ -89,13 +89,13 @@ variants! {
     F64, F64s, f64, 5;
     /// A byte.
     U8, U8s, u8, 17;
-    /// A whole number of 16 bits, 0 or more.
+    /// An unsigned integer of 16 bits.
     U16, U16s, u16, 18;
-    /// A whole number of 32 bits, 0 or more.
+    /// An unsigned integer of 32 bits.
     U32, U32s, u32, 19;
-    /// A whole number of 64 bits.
+    /// A signed integer of 64 bits.
     I64, I64s, i64, 20;
-    /// A whole number of 64 bits, 0 or more.
+    /// An unsigned integer of 64 bits.
     U64, U64s, u64, 21;
     /// Ten-thousandths of a currency unit.
     Currency, Currencies, Currency, 6;
@@ -105,7 +105,7 @@ variants! {
     Error, Errors, Error, 10;
 }
 
-/// A number whose meaning is another than that of the plain type with the same bytes.
+/// A number whose meaning differs from that of the plain type with the same bytes.
 macro_rules! meaning {
     ($($name:ident, $number:ty;)*) => {$(
         #[derive(Clone, Copy, Debug, PartialEq)]
@@ -127,7 +127,7 @@ meaning! {
     Error, i32;
 }
 
-/// Bytes that are still to be read.
+/// Bytes that are not read yet.
 struct Bytes<'a>(&'a [u8]);
 
 impl<'a> Bytes<'a> {
@@ -154,7 +154,8 @@ impl<'a> Bytes<'a> {
         let units: Vec<u16> = self.take(size)?.chunks_exact(2).map(u16::read).collect();
         Ok(String::from_utf16_lossy(&units))
     }
-    /// Refuses a count of values that cannot be there: each has at least `least` bytes.
+    /// Returns an error for a count of values that the remaining bytes cannot hold: each value has at least `least`
+    /// bytes.
     fn enough(&self, count: u32, least: usize) -> Result<()> {
         if count as usize > self.0.len() / least {
             return Err(spoilt(format!("an array claims {count} values, {} bytes are left", self.0.len())));
@@ -181,8 +182,8 @@ fn write_text(text: &str, out: &mut Vec<u8>) {
 }
 
 impl Variant {
-    /// Reads one variant that fills `bytes`. Errors: too few or too many bytes, an unknown type, a count that lies,
-    /// arrays nested more than [`DEEPEST`].
+    /// Reads one variant that fills `bytes`. Returns an error for too few or too many bytes, an unknown type, a
+    /// wrong count, or arrays nested more than [`DEEPEST`] deep.
     pub fn decode(bytes: &[u8]) -> Result<Variant> {
         let mut from = Bytes(bytes);
         let variant = Variant::next(&mut from, 0)?;
@@ -221,7 +222,7 @@ impl Variant {
         })
     }
 
-    /// Adds the bytes of the variant to `out`.
+    /// Appends the bytes of the variant to `out`.
     pub fn encode(&self, out: &mut Vec<u8>) {
         match self {
             Variant::Empty => head(EMPTY, 1, out),
@@ -250,7 +251,7 @@ impl Variant {
         }
     }
 
-    /// A number of any of the plain types.
+    /// The value, if it is a number of a plain type.
     pub fn as_f64(&self) -> Option<f64> {
         Some(match self {
             Variant::I16(x) => f64::from(*x),
@@ -267,7 +268,7 @@ impl Variant {
         })
     }
 
-    /// The numbers of an array of any of the plain types.
+    /// The values, if it is an array of a plain number type.
     pub fn as_f64s(&self) -> Option<Vec<f64>> {
         Some(match self {
             Variant::I16s(all) => all.iter().map(|&x| f64::from(x)).collect(),

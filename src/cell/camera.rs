@@ -1,22 +1,22 @@
-//! The pictures of the cell's cameras: that of the sensor, and the small one in the gripper. Levels have the sensor's
-//! depth, exposures are in us. A picture shows the middle of its exposure, unmoved.
+//! Pictures of the cell's two cameras: the sensor's, and the small one in the gripper. Grey levels have the
+//! sensor's bit depth; exposures are in us. A picture shows the middle of its exposure, without motion blur.
 
 use crate::geometry::{Camera, Flange, Rigid, Vec3};
 use crate::raster::Image;
 use crate::simulate::{Canvas, InScene, Scene, Sensor, Station, View, expose};
 use std::sync::{Mutex, PoisonError};
 
-/// Rays a pixel's side of pictures in room light.
+/// Rays along one side of a pixel, for pictures in room light.
 const RAYS: u32 = 2;
-/// The gripper's camera looks from beside the fingers at what is below the tool, mm before the tool's origin.
+/// Height of the gripper's camera above the tool's origin, mm. It looks past the fingers at what is below the tool.
 const GRIPPER_ABOVE_MM: f64 = 60.0;
 
-/// Exposure that the levels of [`Sensor`] are stated for, and that a camera begins with, us.
+/// Exposure time that the levels of [`Sensor`] are stated for, and the initial setting of a camera, us.
 pub(super) const EXPOSURE_US: f64 = 1000.0;
-/// What a camera can be set to, us.
+/// Range of exposure times, us.
 pub(super) const EXPOSURES_US: [f64; 2] = [20.0, 10_000.0];
 
-/// How long a camera exposes. It keeps this as a camera does: whoever connects next finds it.
+/// A camera's exposure setting. It persists as in a real camera: the next client finds it unchanged.
 pub(super) struct Exposure(Mutex<f64>);
 
 impl Exposure {
@@ -24,7 +24,7 @@ impl Exposure {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether it can be set to that.
+    /// Sets the exposure. Returns false if it is out of range.
     pub fn set(&self, us: f64) -> bool {
         let can = (EXPOSURES_US[0]..=EXPOSURES_US[1]).contains(&us);
         if can {
@@ -40,7 +40,7 @@ impl Default for Exposure {
     }
 }
 
-/// What was lit at the moment of a picture.
+/// The lights that were on at the moment of a picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lit {
     pub line: bool,
@@ -48,14 +48,14 @@ pub(super) struct Lit {
     pub room: bool,
 }
 
-/// The same camera, and its hot pixels, exposed as long as it is set to.
+/// The same camera and its hot pixels at the current exposure setting.
 pub(super) fn exposed(of: &Station, hot: &[(usize, f32)], exposure: &Exposure) -> (Station, Vec<(usize, f32)>) {
     let times = exposure.us() / EXPOSURE_US;
     let station = Station { sensor: of.sensor.exposed(times), ..of.clone() };
     (station, hot.iter().map(|(place, extra)| (*place, extra * times as f32)).collect())
 }
 
-/// One picture. `number` keeps its noise apart from others'.
+/// One picture. `number` seeds its noise, so that each picture has different noise.
 pub(super) fn picture(
     station: &Station,
     scene: &Scene,
@@ -83,13 +83,13 @@ pub(super) fn picture(
     expose(&station.sensor, &laser, &room, gain as f32, hot, &mut rng)
 }
 
-/// The small camera in the gripper: looks along the tool's way, quarter of the large one's width.
+/// The small camera in the gripper: looks along the tool's axis, with half the large camera's width and height.
 pub(super) fn gripper_station(of: &Station, flange_from_tool: &Rigid<Flange, crate::geometry::Tool>) -> Station {
     let mut station = of.clone();
     let width = (of.camera.width / 2).max(160);
     let height = (of.camera.height / 2).max(120);
     station = station.with_size(width, height);
-    // The camera's z goes into what it looks at, the tool's z comes out of it.
+    // The camera's z axis points into the scene, the tool's z axis points out of it.
     let turn = crate::geometry::Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0));
     let tool_from_camera: Rigid<crate::geometry::Tool, Camera> =
         Rigid::new(turn, Vec3::new(0.0, -18.0, GRIPPER_ABOVE_MM));

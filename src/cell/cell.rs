@@ -1,5 +1,5 @@
-//! In: options. Out: a robot cell that exists only here: time, arm, outputs, camera, truth. Everything else talks to
-//! it.
+//! In: options. Out: a simulated robot cell: time, arm, outputs, camera, ground truth. The controller and the
+//! servers act on it.
 //! Frame and unit: base frame, mm; s of the cell.
 
 use super::camera::{self, Exposure, Lit};
@@ -18,27 +18,27 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The gripper on the flange: beside the sensor, pointing where the flange points, mm.
+/// Position of the gripper on the flange, mm: beside the sensor, pointing in the flange's direction.
 const GRIPPER_AT_MM: [f64; 3] = [72.0, 0.0, 160.0];
-/// The calibration board lies so far beside the scene's middle, mm.
+/// Offset of the calibration board from the scene's middle, mm.
 const BOARD_BESIDE_MM: [f64; 3] = [0.0, 170.0, 0.0];
-/// So thick is the plate on the flange that carries a board, mm.
+/// Thickness of the plate on the flange that carries a board, mm.
 const PLATE_MM: f64 = 20.0;
-/// From so many working distances a whole board is in the picture, with the stripe on it.
+/// Distance, in working distances, from which the whole board and the stripe on it are in the picture.
 const BOARD_FROM: f64 = 1.5;
-/// Greys of a printed board.
+/// Grey values of a printed board: white, black.
 const PRINT: [f64; 2] = [0.85, 0.06];
 
-/// What a person jogs the arm over.
+/// Target above which a person jogs the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Over {
-    /// A place of the scene: x, y, mm.
+    /// A position in the scene: x, y, mm.
     Place([f64; 2]),
-    /// The calibration board beside it.
+    /// The calibration board beside the scene.
     Board,
 }
 
-/// A cell. Cheap to clone: all clones are one cell.
+/// A cell. Cheap to clone: all clones share the same cell.
 #[derive(Clone)]
 pub struct Cell(Arc<Inside>);
 
@@ -50,7 +50,7 @@ struct Inside {
     hot: Vec<(usize, f32)>,
     scene: Mutex<Arc<Scene>>,
     base_from_board: Option<Rigid<Base, Board>>,
-    /// Where the sensor stands, if it stands still.
+    /// Pose of the sensor, if it is fixed in the cell.
     base_from_camera: Option<Rigid<Base, Camera>>,
     arm_error: ArmError,
     world: Mutex<World>,
@@ -60,10 +60,10 @@ struct Inside {
 }
 
 impl Cell {
-    /// Builds the cell; its time runs from now on.
+    /// Builds the cell; its time starts now.
     ///
     /// # Errors
-    /// Options out of range, a scene that holds nothing, no part for the component that is named.
+    /// Options out of range, an empty scene, or no part for the named component.
     pub fn new(options: CellOptions) -> Result<Cell> {
         options.check()?;
         let station = Station::of(&options.rig, options.seed);
@@ -102,11 +102,11 @@ impl Cell {
         })))
     }
 
-    /// What it was made with.
+    /// The options that the cell was built with.
     pub fn options(&self) -> &CellOptions {
         &self.0.options
     }
-    /// Its time.
+    /// The cell's clock.
     pub fn clock(&self) -> &Clock {
         &self.0.clock
     }
@@ -117,7 +117,7 @@ impl Cell {
         self.0.scene.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// The picture of a moment that has come: what was lit then, seen from where the flange truly was.
+    /// The picture of a past moment, with the lights that were on then, seen from the flange's true pose.
     pub fn picture(&self, t: f64) -> Image {
         let (lit, scene_from_camera) = self.seen(t, &self.0.station);
         let number = self.0.pictures.fetch_add(1, Ordering::Relaxed);
@@ -129,7 +129,7 @@ impl Cell {
     pub fn gripper_picture(&self, t: f64) -> Image {
         let (lit, scene_from_camera) = self.seen(t, &self.0.gripper);
         let lit = Lit { line: false, pointer: false, ..lit };
-        // Its hot pixels are its own: none.
+        // The gripper's camera has no hot pixels.
         let (station, _) = camera::exposed(&self.0.gripper, &[], self.exposure(true));
         let view = crate::simulate::View { station: &station, scene: &self.scene(), scene_from_camera };
         let (w, h) = (station.camera.width, station.camera.height);
@@ -139,7 +139,7 @@ impl Cell {
         crate::simulate::expose(sensor, &crate::simulate::Canvas::new(w, h), &room, gain as f32, &[], &mut rng)
     }
 
-    /// How long the sensor's camera exposes, or the one in the gripper.
+    /// Exposure setting of the sensor's camera, or of the one in the gripper.
     pub(super) fn exposure(&self, in_gripper: bool) -> &Exposure {
         &self.0.exposures[usize::from(in_gripper)]
     }
@@ -162,7 +162,7 @@ impl Cell {
         (lit, world.true_scene(t).inverse() * base_from_camera)
     }
 
-    /// No laser and no lamp follows its output any more: a fuse is out.
+    /// Disconnects lasers and lamp from their outputs, as a blown fuse does; `false` connects them again.
     pub fn set_dark(&self, dark: bool) {
         let outputs = self.0.options.outputs;
         for number in [outputs.line, outputs.pointer, outputs.room] {
@@ -170,8 +170,8 @@ impl Cell {
         }
     }
 
-    /// What hangs on an output stays on or off, whatever the output says: a wire is off, a relay is welded. `None`:
-    /// it follows.
+    /// Keeps the device on an output on or off, whatever the output's state: a broken wire is off, a welded relay
+    /// is on. `None`: the device follows the output again.
     pub fn stick(&self, number: u16, at: Option<bool>) {
         let mut stuck = self.0.stuck.lock().unwrap_or_else(PoisonError::into_inner);
         match at {
@@ -180,17 +180,18 @@ impl Cell {
         };
     }
 
-    /// What happened so far.
+    /// All events so far.
     pub fn log(&self) -> Vec<Entry> {
         self.log_after(0)
     }
 
-    /// The same without the first `known` entries: who reads on keeps nobody waiting for a copy of all of it.
+    /// The log without the first `known` entries. A reader that follows the log does not block others while all of
+    /// it is copied.
     pub fn log_after(&self, known: usize) -> Vec<Entry> {
         self.world().log.get(known..).unwrap_or_default().to_vec()
     }
 
-    /// How the component was let go; `None` while it is held.
+    /// How the component was released; `None` while it is held.
     pub fn insertion(&self) -> Option<Insertion> {
         self.world().log.iter().rev().find_map(|e| match e.event {
             Event::Released(insertion) => Some(insertion),
@@ -198,17 +199,17 @@ impl Cell {
         })
     }
 
-    /// Collisions so far.
+    /// Number of collisions so far.
     pub fn collisions(&self) -> usize {
         self.world().log.iter().filter(|e| matches!(e.event, Event::Collision { .. })).count()
     }
 
-    /// Motions that were begun.
+    /// Number of motions begun so far.
     pub fn moves(&self) -> usize {
         self.world().log.iter().filter(|e| matches!(e.event, Event::Move { .. })).count()
     }
 
-    /// Lays something else before the robot, at the same place; the gripper gets the component that belongs to it.
+    /// Puts another scene before the robot, at the same pose; the gripper gets the component that belongs to it.
     pub fn lay(&self, spec: &SceneSpec, holds: Option<&str>) -> Result<()> {
         let held = held(spec, holds)?;
         let Places { base_from_scene, flange_from_scene, .. } = *self.world().places();
@@ -217,7 +218,8 @@ impl Cell {
         *self.0.scene.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(scene.clone());
         let parts = parts(spec, &base_from_scene);
         let places = Places { scene, base_from_scene, flange_from_scene, parts, flange_from_tool };
-        // The former scene is large: it is freed after the world's lock, which a Halt waits for.
+        // The old scene is large: it is freed after the world's lock is released, because a Halt waits for that
+        // lock.
         let _former = self.world().replace(places, held);
         let gripper = self.0.options.outputs.gripper;
         let now = self.0.clock.now();
@@ -225,11 +227,11 @@ impl Cell {
         Ok(())
     }
 
-    /// A person moves the arm with the pendant until the sensor looks at a place of the scene, or of the calibration
-    /// board.
+    /// A person moves the arm with the pendant until the sensor looks at a position of the scene, or at the
+    /// calibration board.
     ///
     /// # Errors
-    /// The arm moves, there is no such place, or it is out of reach.
+    /// The arm is moving, there is no calibration board, or the pose is out of reach.
     pub fn jog(&self, over: Over) -> Result<()> {
         let t = self.0.clock.now();
         let mut world = self.world();
@@ -244,8 +246,8 @@ impl Cell {
                 return Err(Fault::usage("there is no calibration board in this cell").next("start it with one"));
             }
         };
-        // Sideways from where the arm stood when the cell was started; over the board also down, until stripe and
-        // spot are on it.
+        // Sideways from the start pose; over the board also down, until the stripe and the pointer's spot are on
+        // it.
         let start = START_DEG.map(f64::to_radians);
         let mut flange = world.drawn().forward(&start);
         let camera = flange * self.0.station.flange_from_camera;
@@ -265,11 +267,11 @@ impl Cell {
         Ok(())
     }
 
-    /// A person moves the arm with the pendant until the sensor looks at the part of the gripper's component.
-    /// The arm stays where the gripper holds nothing, and where the sensor stands still.
+    /// A person moves the arm with the pendant until the sensor looks at the part of the gripper's component. The
+    /// arm stays if the gripper holds nothing, or if the sensor is fixed in the cell.
     ///
     /// # Errors
-    /// As [`Cell::jog`].
+    /// As for [`Cell::jog`].
     pub fn jog_over_its_part(&self) -> Result<()> {
         let held = self.world().held.as_ref().map(|c| c.part.clone());
         let part = self.0.options.scene.part.iter().find(|p| Some(&p.name) == held.as_ref());
@@ -279,54 +281,53 @@ impl Cell {
         }
     }
 
-    // What only tests may know.
+    // Ground truth; only tests may read it.
 
-    /// The specimen on the flange.
+    /// The specimen of the sensor on the flange.
     pub fn station(&self) -> &Station {
         &self.0.station
     }
-    /// Where the scene is.
+    /// Pose of the scene.
     pub fn base_from_scene(&self) -> Rigid<Base, InScene> {
         self.world().places().base_from_scene
     }
-    /// Where the sensor stands, if it stands still.
+    /// Pose of the sensor, if it is fixed in the cell.
     pub fn base_from_camera(&self) -> Option<Rigid<Base, Camera>> {
         self.0.base_from_camera
     }
-    /// Where the calibration board is, if it lies still.
+    /// Pose of the calibration board, if it is fixed in the cell.
     pub fn base_from_board(&self) -> Option<Rigid<Base, Board>> {
         self.0.base_from_board
     }
-    /// Where a part is.
+    /// Pose of a part.
     pub fn base_from_part(&self, name: &str) -> Option<Rigid<Base, Part>> {
         self.world().places().parts.get(name).copied()
     }
-    /// Where the gripper is on the flange.
+    /// Pose of the gripper on the flange.
     pub fn flange_from_tool(&self) -> Rigid<Flange, Tool> {
         self.world().places().flange_from_tool
     }
-    /// How the arm differs from its drawing.
+    /// Deviation of the arm's geometry from its nominal values.
     pub fn arm_error(&self) -> ArmError {
         self.0.arm_error
     }
-    /// Where the flange was as its controller has it.
+    /// Pose of the flange at `t`, as the controller computes it.
     pub fn reported(&self, t: f64) -> Rigid<Base, Flange> {
         self.world().reported(t)
     }
-    /// Where the flange truly was.
+    /// True pose of the flange at `t`.
     pub fn true_flange(&self, t: f64) -> Rigid<Base, Flange> {
         self.world().true_flange(t)
     }
 }
 
-/// The scene's axes as the camera of the design has them where it looks straight down: x along the picture's rows, z
-/// up.
+/// The scene's axes relative to the nominal camera that looks straight down: x along the picture's rows, z up.
 fn scene_in(design: &Station) -> Mat3 {
     design.flange_from_camera.rotation * Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0))
 }
 
-/// Where the scene lies: below the sensor as the arm starts, twice as far as it works, aside, turned and tilted a
-/// little, another way for each seed.
+/// Pose of the scene: below the sensor at the arm's start pose, at twice the working distance. It is shifted,
+/// turned and tilted slightly, differently for each seed; not at all for seed 0.
 fn place(station: &Station, tilt_deg: f64) -> Rigid<Base, InScene> {
     let mut rng = station.rng("cell place", 0);
     let mut within = |by: f64| if station.seed == 0 { 0.0 } else { rng.random_range(-by..=by) };
@@ -343,7 +344,7 @@ fn place(station: &Station, tilt_deg: f64) -> Rigid<Base, InScene> {
     )
 }
 
-/// The joints at the beginning: the sensor over the scene, or moved along with it over the board.
+/// Joints at the start: with the sensor over the scene, or moved parallel to the scene until it is over the board.
 fn start(options: &CellOptions, base_from_scene: &Rigid<Base, InScene>) -> Result<Joints> {
     let (arm, over_scene) = (Vs060::drawn(), START_DEG.map(f64::to_radians));
     if !options.over_board {
@@ -358,13 +359,13 @@ fn start(options: &CellOptions, base_from_scene: &Rigid<Base, InScene>) -> Resul
     })
 }
 
-/// A plate on the flange with the scene on its far side, the calibration board in its middle.
+/// Pose of the scene on the flange: a plate with the scene on its far side, the calibration board in its middle.
 fn on_flange() -> Rigid<Flange, InScene> {
     Rigid::new(Mat3::identity(), Vec3::z() * PLATE_MM - Vec3::from(BOARD_BESIDE_MM))
 }
 
-/// The sensor as it stands: the flange, as the arm begins, holds the board before it as a sensor on the flange would
-/// have it below.
+/// Pose of a sensor fixed in the cell. At the arm's start pose it sees the board on the flange as a sensor on the
+/// flange would see the board below it.
 fn stand(
     options: &CellOptions,
     station: &Station,
@@ -377,7 +378,8 @@ fn stand(
     Ok(arm.forward(&START_DEG.map(f64::to_radians)) * *flange_from_scene * scene_from_camera)
 }
 
-/// The gripper's axes lie as the scene's do while the sensor looks at it, so that little has to be turned.
+/// Pose of the gripper. Its axes are parallel to the scene's while the sensor looks at it, so that little rotation
+/// is needed.
 fn gripper(station: &Station) -> Rigid<Flange, Tool> {
     let mut rng = station.rng("cell gripper", 0);
     let mut within = |by: f64| if station.seed == 0 { 0.0 } else { rng.random_range(-by..=by) };
@@ -403,7 +405,7 @@ fn with_board(
     base_from_scene: &Rigid<Base, InScene>,
 ) -> Result<(Scene, Option<Rigid<Base, Board>>)> {
     let Some(board) = &options.board else { return Ok((scene, None)) };
-    // Its z goes into the board, its middle beside the scene's.
+    // The board's z axis points into the board; its middle lies beside the scene's middle.
     let down = Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0));
     let [x0, y0, x1, y1] = board.outline();
     let at = Vec3::from(BOARD_BESIDE_MM) - down * Vec3::new((x0 + x1) / 2.0, (y0 + y1) / 2.0, 0.0);

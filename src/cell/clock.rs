@@ -1,11 +1,11 @@
-//! In: how fast the cell's time goes. Out: the cell's time; it stands still while a picture is being made that nobody
-//! has to wait for in a real cell.
+//! In: speed of the cell's time. Out: the cell's time. It is held while a picture is rendered, because a real cell
+//! does not wait for that.
 //! Frame and unit: s of the cell since it was started.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How often a waiting thread looks at the time.
+/// Polling interval of a waiting thread.
 const LOOK: Duration = Duration::from_micros(500);
 
 struct Since {
@@ -20,11 +20,11 @@ pub struct Clock {
     since: Mutex<Since>,
 }
 
-/// Holds the time while it lives.
+/// Holds the cell's time until it is dropped.
 pub struct Held<'a>(&'a Clock);
 
 impl Clock {
-    /// `speed` seconds of the cell in one of ours.
+    /// `speed`: seconds of the cell per real second.
     pub fn new(speed: f64) -> Clock {
         Clock { speed, since: Mutex::new(Since { real: Instant::now(), cell: 0.0, holds: 0 }) }
     }
@@ -37,12 +37,12 @@ impl Clock {
         since.cell + if since.holds > 0 { 0.0 } else { since.real.elapsed().as_secs_f64() * self.speed }
     }
 
-    /// The time, s.
+    /// The cell's time, s.
     pub fn now(&self) -> f64 {
         self.of(&self.since())
     }
 
-    /// Lets the time stand still until all that hold it have let go.
+    /// Stops the cell's time until all holders have dropped their `Held`.
     pub fn hold(&self) -> Held<'_> {
         let mut since = self.since();
         since.cell = self.of(&since);
@@ -50,7 +50,7 @@ impl Clock {
         Held(self)
     }
 
-    /// Waits until the cell's time is `t`, or for `most` of ours; true where the time has come.
+    /// Waits until the cell's time is `t`, at most `most` of real time; true if the time has come.
     pub fn wait(&self, t: f64, most: Duration) -> bool {
         let give_up = Instant::now() + most;
         loop {

@@ -1,32 +1,33 @@
-//! In: a part of the scene with holes. Out: the component that goes into it, and the gripper that holds it, as boxes
-//! and pins.
+//! In: a part of the scene with holes. Out: the component that goes into it, and the gripper that holds it, as
+//! boxes and pins.
 //! Frame and unit: tool frame: origin where the component's underside meets the socket's top, z against the
-//! insertion; mm.
+//! direction of insertion; mm.
 
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec3;
 use crate::simulate::{PartSpec, ShapeSpec};
 
-/// Pins reach so far below the component, mm.
+/// Length of the pins below the component, mm.
 pub const PIN_MM: f64 = 2.0;
-/// Height of the component, and of the gripper above it, mm.
+/// Height of the component, mm; `FINGERS_MM` is the size of the gripper above it, mm.
 const BODY_MM: f64 = 6.0;
 const FINGERS_MM: [f64; 3] = [16.0, 10.0, 50.0];
 
-/// What the gripper holds.
+/// The component in the gripper.
 #[derive(Clone, Debug)]
 pub struct Component {
-    /// Name of the part that it belongs to.
+    /// Name of the part that the component belongs to.
     pub part: String,
-    /// Places of the pins, at the underside.
+    /// Positions of the pins, at the underside.
     pub pins: Vec<Vec3>,
-    /// Places on the surfaces of component and gripper that must not be inside anything.
+    /// Points on the surfaces of component and gripper; none of them may be inside another object.
     pub hull: Vec<Vec3>,
-    /// The middle of the pins and the middle of the socket's holes in the part's frame coincide: part from tool, mm.
+    /// Position of the seated tool in the part's frame, where the middle of the pins and of the socket's holes
+    /// coincide, mm.
     pub seat: Vec3,
 }
 
-/// A grid of places on a box's sides.
+/// A grid of points on a box's faces.
 fn on_box(x: [f64; 2], y: [f64; 2], z: [f64; 2], out: &mut Vec<Vec3>) {
     const N: usize = 4;
     let at = |r: [f64; 2], k: usize| r[0] + (r[1] - r[0]) * k as f64 / N as f64;
@@ -42,12 +43,12 @@ fn on_box(x: [f64; 2], y: [f64; 2], z: [f64; 2], out: &mut Vec<Vec3>) {
     }
 }
 
-/// A slot is so many times as long as it is wide.
+/// A slot is more than this many times as long as it is wide.
 const SLOT: f64 = 8.0;
-/// Places along a card's edge that stand for its contacts.
+/// Number of points along a card's edge that represent its contacts.
 const CONTACTS: usize = 12;
 
-/// The contacts of a card that goes into a slot; none where the part has no slot.
+/// The contacts of a card that goes into a slot; empty if the part has no slot.
 fn blade(part: &PartSpec) -> Vec<Vec3> {
     let cuts =
         part.solid.iter().flat_map(|s| s.cut.iter().map(move |c| (Vec3::from(s.at_mm) + Vec3::from(c.at_mm), c)));
@@ -64,7 +65,8 @@ fn blade(part: &PartSpec) -> Vec<Vec3> {
 }
 
 impl Component {
-    /// The component that belongs to a part: a pin for each hole that is there four times or more.
+    /// The component that belongs to a part, with a pin for each hole of a pattern that repeats four times or more.
+    /// A part without such holes but with a slot gets a card. Returns an error if it has neither.
     pub fn of(part: &PartSpec) -> Result<Component> {
         let holes = part.solid.iter().flat_map(|s| s.cut.iter().map(move |c| (s, c)));
         let mut pins = Vec::new();

@@ -1,19 +1,19 @@
-//! In: where the component truly is, and the true scene. Out: whether it went in, how far it is off, and what it hit.
-//! Frame and unit: base frame, mm, degrees. Knows nothing of what was measured.
+//! In: the component's true pose, and the true scene. Out: whether it was inserted, its offset, and what it hit.
+//! Frame and unit: base frame, mm, degrees. Measurements are not used here.
 
 use super::component::{Component, PIN_MM};
 use super::log::{Event, Insertion};
 use crate::geometry::{Base, Part, Rigid, Tool, Vec3};
 use crate::simulate::{InScene, Scene};
 
-/// A pin this far from its hole's axis still finds in: the funnel of a turned contact, less the pin.
+/// A pin this far from its hole's axis still enters the hole: the funnel of a turned contact, less the pin.
 const CAPTURE_MM: f64 = 0.45;
-/// A component is down below this height, and not pressed into the board, mm.
+/// Range of heights at which a component counts as down but not pressed into the board, mm.
 const DOWN_MM: [f64; 2] = [-0.4, 0.4];
 /// Depths below this are contact, not collision, mm.
 const CONTACT_MM: f64 = 0.3;
 
-/// How the component stands to its socket.
+/// Pose of the component relative to its socket.
 pub fn insertion(
     component: &Component,
     base_from_tool: &Rigid<Base, Tool>,
@@ -24,7 +24,8 @@ pub fn insertion(
     let r = &part_from_tool.rotation;
     let turn_deg = r[(1, 0)].atan2(r[(0, 0)]).to_degrees();
     let tilt_deg = r[(2, 2)].clamp(-1.0, 1.0).acos().to_degrees();
-    // A pin may go into the hole of another one: a symmetric component turned by half fits, its turn says so.
+    // Each pin is compared with its own hole: a symmetric component turned by half a turn does not count as
+    // inserted.
     let holes: Vec<Vec3> = component.pins.iter().map(|p| p + component.seat).collect();
     let worst_pin_mm = component
         .pins
@@ -37,7 +38,7 @@ pub fn insertion(
     Insertion { lateral_mm: off.xy().norm(), turn_deg, tilt_deg, height_mm, worst_pin_mm, inserted }
 }
 
-/// The deepest place of component or gripper inside something; `None` where all is free.
+/// The deepest point of component or gripper inside another object; `None` if nothing collides.
 pub fn collision(
     component: Option<&Component>,
     hull: &[Vec3],

@@ -1,5 +1,4 @@
-//! In: joint angles or a flange pose. Out: the other one, for a Denso VS-060 as it is drawn or as one specimen was
-//! built.
+//! In: joint angles or a flange pose. Out: the other of the two, for the nominal Denso VS-060 or for one specimen.
 //! Frame and unit: base_from_flange, mm; joints rad. Chain, limits and speeds: Denso's robot description of the
 //! VS060A3.
 
@@ -10,35 +9,35 @@ use rs_opw_kinematics::kinematics_impl::OPWKinematics;
 use rs_opw_kinematics::parameters::opw_kinematics::Parameters;
 use std::f64::consts::TAU;
 
-/// Six angles, rad.
+/// Six joint angles, rad.
 pub type Joints = [f64; 6];
 
-/// Degrees.
+/// Limits of the joints, degrees.
 const LIMITS: [[f64; 2]; 6] =
     [[-170.0, 170.0], [-120.0, 120.0], [-125.0, 155.0], [-270.0, 270.0], [-120.0, 120.0], [-360.0, 360.0]];
-/// Degrees a second.
+/// Full speeds of the joints, degrees/s.
 pub const SPEEDS: [f64; 6] = [213.75, 142.5, 155.58, 213.75, 164.47, 342.0];
-/// Joint 5 nearer to 0 than this, rad: joints 4 and 6 turn against each other, and a straight motion may need any
-/// speed.
+/// Singular range of joint 5, rad: with joint 5 closer to 0, joints 4 and 6 turn against each other, and a straight
+/// motion may need any speed.
 const SINGULAR: f64 = 2e-3;
 
-/// Why a pose cannot be had.
+/// Why a pose cannot be reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unreachable {
-    /// No angles lead there.
+    /// No joint angles reach the pose.
     TooFar,
-    /// Angles lead there, those of these joints beyond their limits: bit 0 is joint 1.
+    /// Joint angles reach the pose, but these joints are beyond their limits: bit 0 is joint 1.
     Limits(u8),
     /// Joint 5 is at 0.
     Singular,
 }
 
-/// How one specimen differs from the drawing.
+/// Deviation of one specimen from the nominal arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ArmError {
     /// a1, a2, b, c1, c2, c3, c4 of the arm's model, mm.
     pub lengths_mm: [f64; 7],
-    /// Zeros of the joints, degrees.
+    /// Zero offsets of the joints, degrees.
     pub zeros_deg: [f64; 6],
 }
 
@@ -46,12 +45,12 @@ pub struct ArmError {
 pub struct Vs060(OPWKinematics);
 
 impl Vs060 {
-    /// As it is drawn: what its controller computes with.
+    /// The nominal geometry, with which the controller computes.
     pub fn drawn() -> Vs060 {
         Vs060::built(&ArmError::default())
     }
 
-    /// A specimen.
+    /// The geometry of a specimen.
     pub fn built(off: &ArmError) -> Vs060 {
         let [a1, a2, b, c1, c2, c3, c4] = off.lengths_mm;
         Vs060(OPWKinematics::new(Parameters {
@@ -68,7 +67,7 @@ impl Vs060 {
         }))
     }
 
-    /// Where the flange is.
+    /// Pose of the flange.
     pub fn forward(&self, joints: &Joints) -> Rigid<Base, Flange> {
         let pose = self.0.forward(joints);
         let m = DMat3::from_quat(pose.rotation);
@@ -77,7 +76,7 @@ impl Vs060 {
         Rigid::new(rotation, column(pose.translation) * 1e3)
     }
 
-    /// The angles that lead to a pose and lie nearest to others, whole turns of joints 4 and 6 included.
+    /// The joint angles that reach a pose and are closest to `near`, including whole turns of joints 4 and 6.
     pub fn inverse(&self, to: &Rigid<Base, Flange>, near: &Joints) -> Result<Joints, Unreachable> {
         let (t, r) = (to.translation * 1e-3, &to.rotation);
         let column = |k: usize| DVec3::new(r[(0, k)], r[(1, k)], r[(2, k)]);
@@ -104,7 +103,7 @@ impl Vs060 {
     }
 }
 
-/// The same pose with joints 4 and 6 a turn further.
+/// The same pose with joints 4 and 6 a whole turn further or back.
 fn turns(joints: Joints) -> impl Iterator<Item = Joints> {
     [-TAU, 0.0, TAU].into_iter().flat_map(move |j4| {
         [-TAU, 0.0, TAU].into_iter().map(move |j6| {
@@ -115,16 +114,16 @@ fn turns(joints: Joints) -> impl Iterator<Item = Joints> {
     })
 }
 
-/// Bit k: joint k + 1 is beyond its limit.
+/// Bit k is set if joint k + 1 is beyond its limit.
 pub fn out_of_limits(joints: &Joints) -> u8 {
     let out = |(j, [low, high]): (&f64, &[f64; 2])| !(low - 1e-9..=high + 1e-9).contains(&j.to_degrees());
     joints.iter().zip(&LIMITS).enumerate().map(|(k, pair)| u8::from(out(pair)) << k).sum()
 }
 
-/// A number for shoulder, elbow and wrist: 5 where the arm reaches forwards, elbow up, joint 5 positive. Our own
-/// numbering; it changes where a controller's changes.
+/// A number for shoulder, elbow and wrist: 5 if the arm reaches forwards, elbow up, joint 5 positive. The numbering
+/// is Sheetlight's, but it changes where a controller's changes.
 pub fn figure(joints: &Joints) -> i32 {
-    // Reach of the wrist's centre before joint 1's axis, in units of the upper arm.
+    // Reach of the wrist's centre in front of joint 1's axis, mm; 305 and 300 are the lengths of the two arm links.
     let forwards = 305.0 * joints[1].sin() + 300.0 * (joints[1] + joints[2]).sin() >= 0.0;
     i32::from(forwards) | i32::from(joints[2] < -1.909f64.to_radians()) << 1 | i32::from(joints[4] >= 0.0) << 2
 }
@@ -133,7 +132,7 @@ pub fn figure(joints: &Joints) -> i32 {
 mod tests {
     use super::*;
 
-    /// Reference poses of the joint chain, worked out by others: docs/robots.md, VS-060.
+    /// Reference poses of the joint chain from other sources: docs/robots.md, VS-060.
     #[test]
     fn the_flange_is_where_the_joint_chain_puts_it() {
         for (joints, position) in [

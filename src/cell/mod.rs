@@ -1,6 +1,6 @@
-//! In: a scene and a seed. Out: a robot cell that exists only here: arm, controller, camera, lasers, gripper, at the
-//! level of their wires; and its judge.
-//! Frame and unit: base frame; mm, radians; s of the cell's own time.
+//! In: a scene and a seed. Out: a simulated robot cell: arm, controller, camera, lasers, gripper, at the level of
+//! their wires; and a judge of what was done.
+//! Frame and unit: base frame; mm, radians; s of the cell's time.
 
 mod camera;
 #[allow(clippy::module_inception, reason = "the room's one thing")]

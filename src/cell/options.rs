@@ -1,51 +1,50 @@
-//! In: what a person chooses of a simulated cell. Out: the same, checked.
-//! Frame and unit: mm, degrees; each field says.
+//! In: a person's choices for a simulated cell. Out: the same, checked.
+//! Frame and unit: mm, degrees; see each field.
 
 use crate::arm::Outputs;
 use crate::fault::{Fault, Result};
 use crate::recording::BoardSpec;
 use crate::simulate::{RigSpec, SceneSpec};
 
-/// What stands in the cell and how well it is made.
+/// Content of the cell and its accuracy.
 #[derive(Clone, Debug)]
 pub struct CellOptions {
-    /// What lies before the robot.
+    /// The scene before the robot.
     pub scene: SceneSpec,
-    /// A calibration board beside it.
+    /// A calibration board beside the scene.
     pub board: Option<BoardSpec>,
-    /// The arm begins over the board, as an operator jogs it there to calibrate; else over the scene.
+    /// The arm starts over the board, as jogged there by an operator for calibration; otherwise over the scene.
     pub over_board: bool,
-    /// The sensor stands still and the flange carries board and scene before it, as for a sensor that is fixed in the
-    /// cell.
+    /// The sensor is fixed in the cell and the flange carries board and scene before it.
     pub eye_to_hand: bool,
     /// The design of the sensor.
     pub rig: RigSpec,
-    /// Specimen, places and noise; 0 is the design itself.
+    /// Seed of specimen, poses and noise; 0 is the nominal design.
     pub seed: u64,
-    /// Seconds of the cell in one of ours, 0.1 to 1000.
+    /// Seconds of the cell per real second, 0.1 to 1000.
     pub speed: f64,
-    /// Repeatability: how far the arm truly stands from what it reports, 1 sigma an axis, mm, 0 to 1 ...
+    /// Repeatability: deviation of the arm's true pose from the reported one, 1 sigma per axis, mm, 0 to 1 ...
     pub noise_mm: f64,
     /// ... and degrees, 0 to 1.
     pub noise_deg: f64,
-    /// Largest error of each length of the arm, mm, 0 to 2 ...
+    /// Largest error of each link length of the arm, mm, 0 to 2 ...
     pub arm_error_mm: f64,
     /// ... and of each joint's zero, degrees, 0 to 1.
     pub arm_error_deg: f64,
-    /// Largest tilt of the scene against the base, degrees, 0 to 15.
+    /// Largest tilt of the scene relative to the base, degrees, 0 to 15.
     pub tilt_deg: f64,
-    /// Name of the part of the scene that the component in the gripper belongs to; `None`: the first that has holes.
+    /// Name of the part whose component is in the gripper; `None`: the first part that has holes.
     pub holds: Option<String>,
-    /// Pictures that the camera takes in a second of the cell, 1 to 2000.
+    /// Frame rate of the camera, pictures per second of the cell, 1 to 2000.
     pub fps: f64,
-    /// What the camera says of a picture's time is late by so much, ms, -1000 to 1000.
+    /// Delay of the time stamps of the camera's pictures, ms, -1000 to 1000.
     pub camera_delay_ms: f64,
-    /// Where lasers, lamp and gripper hang.
+    /// Numbers of the outputs for lasers, lamp and gripper.
     pub outputs: Outputs,
 }
 
 impl CellOptions {
-    /// A cell with a scene, all else as a good arm has it.
+    /// A cell with a scene, and a good arm's values for all other options.
     pub fn of(scene: SceneSpec, seed: u64) -> CellOptions {
         CellOptions {
             scene,
@@ -67,7 +66,7 @@ impl CellOptions {
         }
     }
 
-    /// Refuses numbers out of the ranges that the fields state.
+    /// Returns an error for a number outside the range that its field states.
     pub fn check(&self) -> Result<()> {
         if self.over_board && self.board.is_none() {
             return Err(Fault::usage("the arm shall begin over the board, but there is no board")

@@ -1,5 +1,5 @@
-//! In: joints at the start, a pose or joints at the end, speeds. Out: where the joints are at any time of the motion,
-//! speed and acceleration limited; or why it cannot be made.
+//! In: joints at the start, a pose or joints at the end, speeds. Out: the joints at any time of the motion, with
+//! limited speed and acceleration; or why the motion is not possible.
 //! Frame and unit: base_from_flange, mm; joints rad; times s from the motion's start.
 
 use super::kinematics::{Joints, SPEEDS, Unreachable, Vs060, out_of_limits};
@@ -7,18 +7,19 @@ use crate::geometry::{Base, Flange, Rigid, exp, log};
 
 /// Full speed and acceleration of straight motions, mm/s and mm/s².
 pub const STRAIGHT: [f64; 2] = [1000.0, 5000.0];
-/// The same for turning, rad/s and rad/s².
+/// The same for rotation, rad/s and rad/s².
 const TURNING: [f64; 2] = [3.5, 17.0];
-/// Joints reach their full speed in this time, s.
+/// Time in which joints reach their full speed, s.
 const RAMP: f64 = 0.25;
-/// A halted arm brakes at this many times its full acceleration: a real one does from 1 m/s in some 80 ms.
+/// A halted arm brakes at this multiple of its full acceleration: a real arm stops from 1 m/s in about 80 ms.
 const BRAKE: f64 = 2.5;
-/// Between knots of a straight way: mm and rad. The arc between joint angles bends by less than 0.001 mm over it.
+/// Distance between knots of a straight path, mm and rad. The arc that interpolated joint angles make between knots
+/// deviates by less than 0.001 mm.
 const KNOTS: [f64; 2] = [2.0, 0.01];
-/// Joints that turn more than this between two knots, rad, have changed their figure.
+/// Joints that turn more than this between two knots, rad, have changed the arm's figure.
 const JUMP: f64 = 0.35;
 
-/// Shares of the full speeds and accelerations.
+/// Fractions of the full speeds and accelerations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Share {
     /// 0 to 1.
@@ -27,12 +28,12 @@ pub struct Share {
     pub acceleration: f64,
 }
 
-/// The way from 0 to 1 and its time: faster, then even, then slower; cut short by a halt.
+/// Trapezoidal profile from 0 to 1 over time; a halt cuts it short.
 #[derive(Clone, Copy, Debug)]
 struct Profile {
     speed: f64,
     acceleration: f64,
-    /// When, where and how fast it was when it was halted.
+    /// Time, position and speed when it was halted.
     halted: Option<(f64, f64, f64)>,
 }
 
@@ -52,7 +53,7 @@ impl Profile {
     fn duration(&self) -> f64 {
         self.halted.map_or_else(|| self.whole(), |(t, _, v)| t + v / self.brake())
     }
-    /// Where and how fast.
+    /// Position and speed.
     fn at(&self, t: f64) -> (f64, f64) {
         if let Some((since, u, v)) = self.halted.filter(|h| t > h.0) {
             let dt = (t - since).min(v / self.brake());
@@ -74,26 +75,26 @@ impl Profile {
 /// A motion of the joints.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
-    /// Evenly spaced along the way.
+    /// Evenly spaced along the path.
     knots: Vec<Joints>,
     profile: Profile,
 }
 
 impl Trajectory {
-    /// All joints together, each within its limits.
+    /// All joints at once, each within its limits.
     pub fn joint(from: &Joints, to: &Joints, share: Share) -> Result<Trajectory, Unreachable> {
         match out_of_limits(to) {
             0 => {}
             bits => return Err(Unreachable::Limits(bits)),
         }
-        // Share of the way in a second at full speed.
+        // Fraction of the path per second at full speed.
         let slowest = from.iter().zip(to).zip(SPEEDS).map(|((a, b), full)| full.to_radians() / (b - a).abs().max(1e-9));
         let full = slowest.fold(1e9, f64::min);
         let profile = Profile::new(full * share.speed, full / RAMP * share.acceleration);
         Ok(Trajectory { knots: vec![*from, *to], profile })
     }
 
-    /// A straight line of the flange, turning evenly.
+    /// A straight line of the flange, with rotation at a constant rate.
     pub fn straight(
         arm: &Vs060,
         from: &Joints,
@@ -123,12 +124,12 @@ impl Trajectory {
         Ok(Trajectory { knots, profile })
     }
 
-    /// s.
+    /// Duration, s.
     pub fn duration(&self) -> f64 {
         self.profile.duration()
     }
 
-    /// Share of the way that is done, 0 to 1.
+    /// Fraction of the path that is done, 0 to 1.
     pub fn done(&self, t: f64) -> f64 {
         self.profile.at(t).0
     }
@@ -142,7 +143,7 @@ impl Trajectory {
         std::array::from_fn(|j| self.knots[k][j] + f * (self.knots[(k + 1).min(last)][j] - self.knots[k][j]))
     }
 
-    /// Brakes from time `t` on; without effect on a motion that has ended or brakes already.
+    /// Brakes from time `t` on; no effect on a motion that has ended or is already braking.
     pub fn halt(&mut self, t: f64) {
         if t < self.duration() && self.profile.halted.is_none() {
             let (u, v) = self.profile.at(t);

@@ -1,5 +1,5 @@
-//! In: motions and switches as the controller makes them, the cell's time. Out: where everything truly is at any
-//! moment that is not too long ago, what the controller believes, and what happened.
+//! In: motions and output switches from the controller, the cell's time. Out: the true pose of everything at any
+//! recent moment, the controller's view of it, and the event log.
 //! Frame and unit: base frame, mm; joints rad; s of the cell.
 
 use super::component::Component;
@@ -15,14 +15,14 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use std::collections::{BTreeMap, VecDeque};
 
-/// Where the arm stands when the cell is started, degrees: the tool points straight down.
+/// The arm's joints when the cell is started, degrees: the tool points straight down.
 pub const START_DEG: Joints = [0.0, 0.0, 90.0, 0.0, 90.0, 0.0];
-/// Motions and switches that are remembered, for pictures of moments that have passed.
+/// Number of motions and switches that are remembered, for pictures of past moments.
 const REMEMBERED: usize = 64;
-/// Places along a motion at which collisions are looked for, a mm.
+/// Points per mm of a motion at which collisions are checked.
 const LOOKS_PER_MM: f64 = 1.0;
 
-/// A motion and when it began; how far the arm is truly off before and after it: mm and rad.
+/// A motion and its start time; `off`: the true deviation of the arm before and after it, mm and rad.
 struct Segment {
     start: f64,
     trajectory: Trajectory,
@@ -30,36 +30,36 @@ struct Segment {
     straight: bool,
 }
 
-/// What stands where.
+/// Poses of all objects.
 pub struct Places {
-    /// What lies before the robot.
+    /// The scene before the robot.
     pub scene: Scene,
-    /// Where that is; nowhere in the cell where it rides on the flange.
+    /// Pose of the scene; has no meaning if the scene is on the flange.
     pub base_from_scene: Rigid<Base, InScene>,
-    /// Where it is on the flange, if it rides there.
+    /// Pose of the scene on the flange, if it is mounted there.
     pub flange_from_scene: Option<Rigid<Flange, InScene>>,
-    /// The sockets in it by name.
+    /// Poses of the scene's sockets by name.
     pub parts: BTreeMap<String, Rigid<Base, Part>>,
-    /// The gripper on the flange.
+    /// Pose of the gripper on the flange.
     pub flange_from_tool: Rigid<Flange, Tool>,
 }
 
-/// Everything that changes.
+/// The state of the cell that changes.
 pub struct World {
     drawn: Vs060,
     built: Vs060,
     segments: VecDeque<Segment>,
     rest: (Joints, [f64; 6]),
-    /// Since when which outputs are on.
+    /// States of the outputs, each with the time from which it holds.
     switched: VecDeque<(f64, BTreeMap<u16, bool>)>,
     outputs: Outputs,
     noise: [f64; 2],
     rng: Pcg64,
     places: Places,
-    /// What the gripper holds.
+    /// The component in the gripper.
     pub held: Option<Component>,
     hull: Vec<Vec3>,
-    /// What happened, in order.
+    /// All events, in order.
     pub log: Vec<Entry>,
 }
 
@@ -91,12 +91,12 @@ impl World {
         }
     }
 
-    /// Arm as its controller computes it.
+    /// The arm's geometry as the controller assumes it.
     pub fn drawn(&self) -> &Vs060 {
         &self.drawn
     }
 
-    /// Adds to the log.
+    /// Appends to the log.
     pub fn note(&mut self, t: f64, event: Event) {
         self.log.push(Entry { t_s: t, event });
     }
@@ -109,17 +109,17 @@ impl World {
         (s.trajectory.joints(dt), std::array::from_fn(|k| s.off[0][k] + u * (s.off[1][k] - s.off[0][k])))
     }
 
-    /// The joints as the encoders read them.
+    /// The joints that the encoders measure.
     pub fn joints(&self, t: f64) -> Joints {
         self.at(t).0
     }
 
-    /// The flange as the controller reports it.
+    /// Pose of the flange as the controller reports it.
     pub fn reported(&self, t: f64) -> Rigid<Base, Flange> {
         self.drawn.forward(&self.joints(t))
     }
 
-    /// Where the flange truly is.
+    /// True pose of the flange.
     pub fn true_flange(&self, t: f64) -> Rigid<Base, Flange> {
         let (joints, off) = self.at(t);
         let pose = self.built.forward(&joints);
@@ -127,23 +127,23 @@ impl World {
         Rigid::new(turn * pose.rotation, pose.translation + Vec3::new(off[0], off[1], off[2]))
     }
 
-    /// Where the scene truly is.
+    /// True pose of the scene.
     pub fn true_scene(&self, t: f64) -> Rigid<Base, InScene> {
         self.places.flange_from_scene.map_or(self.places.base_from_scene, |f| self.true_flange(t) * f)
     }
 
-    /// Where the gripper's tool truly is.
+    /// True pose of the gripper's tool.
     pub fn true_tool(&self, t: f64) -> Rigid<Base, Tool> {
         self.true_flange(t) * self.places.flange_from_tool
     }
 
-    /// Until when the arm moves, s; none where it stands.
+    /// Time until which the arm moves, s; `None` if it stands still.
     pub fn moving_until(&self, t: f64) -> Option<f64> {
         let end = self.segments.back().map(|s| s.start + s.trajectory.duration())?;
         (end > t).then_some(end)
     }
 
-    /// Begins a motion from where the arm stands; returns its number.
+    /// Begins a motion from the arm's current pose; returns the length of the log after it.
     pub fn begin(&mut self, t: f64, trajectory: Trajectory, straight: bool, connection: u64) -> usize {
         let (_, off) = self.at(t);
         let [mm, rad] = self.noise;
@@ -158,14 +158,14 @@ impl World {
         self.log.len()
     }
 
-    /// A person has moved the arm with the pendant; it stands there.
+    /// Sets the joints after a person moved the arm with the pendant.
     pub fn stand(&mut self, t: f64, joints: Joints) {
         self.segments.clear();
         self.rest = (joints, [0.0; 6]);
         self.note(t, Event::Jogged { to: self.drawn.forward(&joints) });
     }
 
-    /// Stops whatever moves; says whether something did.
+    /// Stops any motion; returns whether one was under way.
     pub fn halt(&mut self, t: f64, connection: Option<u64>) -> bool {
         let moving = self.moving_until(t).is_some();
         if let Some(s) = self.segments.back_mut().filter(|_| moving) {
@@ -175,7 +175,7 @@ impl World {
         moving
     }
 
-    /// The motion that was begun last has ended: what it hit on its way is noted.
+    /// Logs that the last motion has ended, and the first collision on its path.
     pub fn arrived(&mut self, t: f64) {
         let Some(s) = self.segments.back() else { return };
         let (start, end) = (s.start, s.start + s.trajectory.duration());
@@ -185,7 +185,7 @@ impl World {
         let near = |pose: &Rigid<Base, Tool>| {
             judge::collision(self.held.as_ref(), &self.hull, pose, &self.places.scene, &self.places.base_from_scene)
         };
-        // What the flange carries cannot be run into.
+        // Collisions with a scene on the flange are not checked.
         let looks = if self.places.flange_from_scene.is_some() { 0 } else { looks };
         let times = (1..=looks).map(|k| start + (end - start) * k as f64 / looks as f64);
         let hit = times.filter_map(|at| near(&self.true_tool(at)).map(|event| (at, event))).next();
@@ -195,18 +195,18 @@ impl World {
         }
     }
 
-    /// Which outputs were on.
+    /// States of the outputs at `t`.
     pub fn outputs(&self, t: f64) -> &BTreeMap<u16, bool> {
         let then = self.switched.iter().rev().find(|(since, _)| *since <= t).or(self.switched.front());
         &then.expect("starts with one").1
     }
 
-    /// Whether an output was on.
+    /// Whether an output was on at `t`.
     pub fn output(&self, number: u16, t: f64) -> bool {
         self.outputs(t).get(&number).copied().unwrap_or(false)
     }
 
-    /// Switches an output; a gripper that opens lets its component go.
+    /// Switches an output; a gripper that opens releases its component.
     pub fn switch(&mut self, t: f64, number: u16, on: bool) {
         let before = self.output(number, t);
         let mut all = self.outputs(t).clone();
@@ -229,12 +229,12 @@ impl World {
         self.note(t, Event::Released(insertion));
     }
 
-    /// What stands where.
+    /// Poses of all objects.
     pub fn places(&self) -> &Places {
         &self.places
     }
 
-    /// Other things lie before the robot now; gives those that lay there.
+    /// Replaces the objects before the robot; returns the old ones.
     pub fn replace(&mut self, places: Places, held: Option<Component>) -> Places {
         self.hull = held.as_ref().map_or(Vec::new(), |c| c.hull.clone());
         self.held = held;

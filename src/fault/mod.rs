@@ -8,7 +8,7 @@ pub use gate::Gate;
 use std::fmt;
 use std::path::Path;
 
-/// What sort of trouble it is; decides the exit code and lets tests match without reading words.
+/// Category of the error. It decides the exit code, and tests compare it instead of the wording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
@@ -24,27 +24,27 @@ pub enum Kind {
     Device,
 }
 
-/// An error a person can act on: what happened (with the number seen and the limit), the likely
-/// cause, and the next step. A bug is a panic, never a `Fault`; missing laser pixels are neither.
+/// An error that a user can act on: what happened (with the value and the limit), the likely cause, and the next
+/// step. A bug is a panic, never a `Fault`. Missing laser pixels are neither.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
     /// Decides the exit code.
     pub kind: Kind,
-    /// What happened, with the number seen and the limit.
+    /// What happened, with the value and the limit.
     pub what: String,
-    /// The likely cause, in one sentence; empty where nothing is likely.
+    /// The likely cause, in one sentence; empty if no cause is likely.
     pub cause: String,
-    /// The next step, in one sentence; empty where there is none.
+    /// The next step, in one sentence; empty if there is none.
     pub next: String,
 }
 
-/// The cause of a result that found no room.
+/// The cause stated when a result does not fit on the disk.
 const FULL: &str = "the disk is full";
 
-/// What every function returns that bad input can stop.
+/// Result of every function that bad input can stop.
 pub type Result<T> = std::result::Result<T, Fault>;
 
-/// What is said of a word that names none of `T`'s values: all that there are.
+/// Message for a word that names no value of `T`; it lists all valid names.
 ///
 /// ```
 /// #[derive(Clone, Copy, strum::IntoStaticStr, strum::VariantArray)]
@@ -58,11 +58,11 @@ pub fn unknown<T: strum::VariantArray + Copy + Into<&'static str>>(what: &str, w
 }
 
 impl Fault {
-    /// Without cause and next step; [`Fault::cause`] and [`Fault::next`] add them.
+    /// An error without cause and next step; [`Fault::cause`] and [`Fault::next`] add them.
     pub fn new(kind: Kind, what: impl Into<String>) -> Fault {
         Fault { kind, what: what.into(), cause: String::new(), next: String::new() }
     }
-    /// The command or its options make no sense.
+    /// The command or its options are invalid.
     pub fn usage(what: impl Into<String>) -> Fault {
         Fault::new(Kind::Usage, what)
     }
@@ -92,12 +92,12 @@ impl Fault {
         self.next = next.into();
         self
     }
-    /// Puts the place (a file, a shot, a key) before what happened.
+    /// Puts the location (a file, a shot, a key) in front of what happened.
     pub fn at(mut self, place: impl fmt::Display) -> Fault {
         self.what = format!("{place}: {}", self.what);
         self
     }
-    /// A result found no room on its disk.
+    /// True if a result could not be written because the disk is full.
     pub fn is_full_disk(&self) -> bool {
         self.kind == Kind::Output && self.cause == FULL
     }
@@ -119,7 +119,7 @@ impl Fault {
                 "check the path and its permissions"
             })
     }
-    /// No thread could be started.
+    /// A thread could not be started.
     pub fn threads(e: &std::io::Error) -> Fault {
         Fault::device(format!("no further thread can be started: {e}"))
             .cause("the memory ran out, or the number of processes is limited")

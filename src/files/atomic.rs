@@ -1,5 +1,5 @@
-//! In: bytes and a path. Out: a file that has its name only when every byte of it is on the disk; the one way in which
-//! results are written.
+//! In: bytes and a path. Out: a file that gets its name only when all its bytes are on the disk. All results are
+//! written this way.
 //! Frame and unit: none.
 
 use super::folder::{remove, sync_folder};
@@ -11,21 +11,22 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use tempfile::NamedTempFile;
 
-/// Writes to a temporary file in the same folder, syncs it, and renames it over `path`. A link of that name is
-/// replaced, not followed.
+/// Writes to a temporary file in the same folder, syncs it, and renames it to `path`. A symbolic link of that name
+/// is replaced, not followed.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_aside(path, bytes)?.keep()
 }
 
-/// [`write()`] without waiting for the disk: for pictures by the hundred that can be made again. Half of one never
-/// has its name, but a power cut may take whole ones.
+/// [`write()`] without waiting for the disk, for hundreds of pictures that can be made again. A half-written file
+/// never gets its name, but a power cut may lose whole files.
 pub fn write_unsynced(path: &Path, bytes: &[u8]) -> Result<()> {
     let aside = write_aside(path, bytes)?;
     rename(aside.file, path).map_err(|e| Fault::write(path, e))
 }
 
-/// [`write()`] of a result and of what is shown beside it (its picture, its page). Whenever the program is stopped or
-/// the disk is full, the result is the old one or the new one, whole, and beside it stands its own or nothing.
+/// [`write()`] for a result and the files that accompany it (its picture, its page). Whenever the program stops or
+/// the disk is full, the result is entirely the old one or entirely the new one. The accompanying files then belong
+/// to that result or are missing.
 pub fn write_beside(result: (&Path, &[u8]), beside: &[(&Path, &[u8])]) -> Result<()> {
     let aside = |(path, bytes): (&Path, &[u8])| {
         let aside = write_aside(path, bytes)?;
@@ -37,8 +38,8 @@ pub fn write_beside(result: (&Path, &[u8]), beside: &[(&Path, &[u8])]) -> Result
     std::iter::once(first).chain(others).try_for_each(Aside::keep)
 }
 
-/// [`Aside::keep`] of many. A thread each, or as many as can be had, because files that are waited for together reach
-/// the disk together.
+/// [`Aside::keep`] for many files. Each file gets a thread, as far as threads can be started, because files that
+/// are synced at the same time reach the disk together.
 pub fn keep_all(files: Vec<Aside>) -> Result<()> {
     let threads = files.len();
     let left = Mutex::new(files);
@@ -54,13 +55,13 @@ pub fn keep_all(files: Vec<Aside>) -> Result<()> {
     })
 }
 
-/// A file that is written under another name and may not have reached the disk.
+/// A file that is written under a temporary name and may not have reached the disk.
 pub struct Aside {
     file: NamedTempFile,
     path: PathBuf,
 }
 
-/// The first half of [`write()`]; without the second, [`Aside::keep`], nothing is left of it.
+/// The first half of [`write()`]. Without the second half, [`Aside::keep`], the file is removed.
 pub fn write_aside(path: &Path, bytes: &[u8]) -> Result<Aside> {
     let mut aside = Aside::create(path)?;
     moment().and_then(|()| aside.file.write_all(bytes)).map_err(|e| Fault::write(path, e))?;
@@ -68,20 +69,20 @@ pub fn write_aside(path: &Path, bytes: &[u8]) -> Result<Aside> {
 }
 
 impl Aside {
-    /// An empty one, to be filled through [`Aside::file`].
+    /// Creates an empty file, to be filled through [`Aside::file`].
     pub fn create(path: &Path) -> Result<Aside> {
         let file = moment().and_then(|()| temporary(folder_of(path))).map_err(|e| Fault::write(path, e))?;
         Ok(Aside { file, path: path.to_owned() })
     }
-    /// The open file, to be written to; it is still under a temporary name.
+    /// The open file to write to; it still has its temporary name.
     pub fn file(&self) -> &std::fs::File {
         self.file.as_file()
     }
-    /// Waits until it is on the disk.
+    /// Waits until the file is on the disk.
     fn sync(&self) -> Result<()> {
         moment().and_then(|()| self.file.as_file().sync_all()).map_err(|e| Fault::write(&self.path, e))
     }
-    /// Waits until it is on the disk, gives it its name, and waits until the name is on the disk too.
+    /// Waits until the file is on the disk, gives it its name, and waits until the name is on the disk too.
     pub fn keep(self) -> Result<()> {
         self.sync()?;
         let kept = rename(self.file, &self.path).and_then(|()| sync_folder(folder_of(&self.path)));

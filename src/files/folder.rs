@@ -1,5 +1,5 @@
-//! In: paths of folders and of what lies in them. Out: folders that are there, names that are on the disk, things
-//! taken away.
+//! In: paths of folders and of their content. Out: folders that exist, names that are on the disk, paths that are
+//! removed.
 //! Frame and unit: none.
 
 use super::moment;
@@ -7,17 +7,17 @@ use crate::fault::{Fault, Result};
 use std::io::{ErrorKind, Result as Io};
 use std::path::Path;
 
-/// Makes a folder and those above it; one that is there is no error.
+/// Creates a folder and its parents; an existing folder is no error.
 pub fn make_folder(folder: &Path) -> Result<()> {
     moment().and_then(|()| std::fs::create_dir_all(folder)).map_err(|e| Fault::write(folder, e))
 }
 
-/// Puts a folder's list of names on the disk; only Unix can.
+/// Syncs a folder's list of names to the disk; only Unix can do this.
 pub(super) fn sync_folder(folder: &Path) -> Io<()> {
     if cfg!(unix) { std::fs::File::open(folder)?.sync_all() } else { Ok(()) }
 }
 
-/// Takes a file, a link or a folder away; one that is not there is no error.
+/// Removes a file, a link or a folder; a missing one is no error.
 pub fn remove(path: &Path) -> Io<()> {
     moment()?;
     let gone = match std::fs::symlink_metadata(path) {

@@ -1,10 +1,11 @@
-//! In: where a result is to go, and what it is made from. Out: a refusal where it would replace one of those.
+//! In: the path of a result and the paths it is made from. Out: an error if the result would replace one of its
+//! inputs.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
 use std::path::{Path, PathBuf};
 
-/// Refuses `out` where it is one of `inputs`, by whatever path or link.
+/// Returns an error if `out` is one of `inputs`, by whatever path or link.
 pub fn not_over<'a>(out: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> Result<()> {
     let Some(real) = real(out) else { return Ok(()) };
     match inputs.into_iter().find(|i| self::real(i).as_ref() == Some(&real)) {
@@ -15,7 +16,7 @@ pub fn not_over<'a>(out: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> R
     }
 }
 
-/// Refuses `out` where it is a file directly inside one of `folders`, under a name that `theirs` claims.
+/// Returns an error if `out` lies directly inside `folder` and its name is one that `theirs` claims.
 pub fn not_over_any(out: &Path, folder: &Path, theirs: impl Fn(&str) -> bool) -> Result<()> {
     let inside = out.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
     let same = inside.and_then(real).is_some_and(|p| Some(p) == real(folder));
@@ -28,7 +29,7 @@ pub fn not_over_any(out: &Path, folder: &Path, theirs: impl Fn(&str) -> bool) ->
     Ok(())
 }
 
-/// The path without links and dots; of a file that is not there yet, as far as its folder.
+/// The path without links and dots. For a file that does not exist yet, only its folder is resolved.
 fn real(path: &Path) -> Option<PathBuf> {
     if let Ok(real) = path.canonicalize() {
         return Some(real);

@@ -1,5 +1,5 @@
-//! In: lines, one after the other. Out: a file that grows by whole lines that are on the disk before the call
-//! returns; a line that a crash cut off is ended before the next is written.
+//! In: lines, one after the other. Out: a file that grows by whole lines, each on the disk before the call returns.
+//! A line that a crash cut off is ended before the next line is written.
 //! Frame and unit: none; text.
 
 use crate::fault::{Fault, Result};
@@ -7,7 +7,7 @@ use std::fs::OpenOptions;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Adds a line to a file, which is made where it is not there.
+/// Appends a line to a file, which is created if missing.
 pub fn append_line(path: &Path, line: &str) -> Result<()> {
     let write = || -> std::io::Result<()> {
         super::moment::moment()?;

@@ -1,5 +1,5 @@
-//! In: folders that results are written into. Out: files under temporary names, held by a lock as long as who writes
-//! them lives, and those gone that a killed process has left.
+//! In: folders that results are written into. Out: files under temporary names, locked as long as their writer
+//! lives. Temporary files that a killed process left behind are removed.
 //! Frame and unit: none.
 
 use super::remove;
@@ -10,16 +10,17 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use tempfile::NamedTempFile;
 
-/// What our temporary names begin with: nobody else's.
+/// Prefix of Sheetlight's temporary names; no other program uses it.
 const PREFIX: &str = ".sheetlight.";
-/// Another process that sweeps may have taken a new file before it was locked; twice in a row is as good as never.
+/// Another process that sweeps may remove a new file before it is locked. That this happens twice in a row is very
+/// unlikely.
 const TRIES: usize = 8;
 
-/// A temporary file that others may read as they may read any other result: temporary files are private by default, and
-/// stay so when they are renamed. The first in a folder sweeps it.
+/// Creates a temporary file that others may read like any other result: temporary files are private by default, and
+/// stay private when they are renamed. The first call for a folder sweeps it.
 pub(super) fn temporary(folder: &Path) -> Io<NamedTempFile> {
     if first_in(folder) {
-        // What cannot be taken away hinders nobody.
+        // A file that cannot be removed does no harm.
         let _ = sweep(folder);
     }
     for _ in 0..TRIES {
@@ -30,7 +31,7 @@ pub(super) fn temporary(folder: &Path) -> Io<NamedTempFile> {
         let file = builder.tempfile_in(folder)?;
         match file.as_file().try_lock() {
             Err(TryLockError::WouldBlock) => {}
-            // Where there are no locks nothing is swept either.
+            // On a file system without locks nothing is swept either.
             Ok(()) | Err(TryLockError::Error(_)) if file.path().exists() => return Ok(file),
             _ => {}
         }
@@ -38,12 +39,12 @@ pub(super) fn temporary(folder: &Path) -> Io<NamedTempFile> {
     Err(std::io::Error::other("temporary files are taken away as soon as they are made"))
 }
 
-/// Takes away the temporary files in a folder that nobody writes any more.
+/// Removes the temporary files in a folder that no process writes any more.
 pub fn sweep(folder: &Path) -> Io<()> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
     let ours = |path: &PathBuf| {
         let name = path.file_name().is_some_and(|n| n.to_string_lossy().starts_with(PREFIX));
-        // A link would be followed by the lock.
+        // Locking would follow a symbolic link.
         name && std::fs::symlink_metadata(path).is_ok_and(|m| m.is_file())
     };
     for path in entries.flatten().map(|e| e.path()).filter(ours) {
@@ -55,8 +56,8 @@ pub fn sweep(folder: &Path) -> Io<()> {
     Ok(())
 }
 
-/// Whether this process writes into a folder for the first time: a list of thousands of pictures is read once, not
-/// for each.
+/// Whether this process writes into a folder for the first time. A folder of thousands of pictures is then listed
+/// once, not for each picture.
 fn first_in(folder: &Path) -> bool {
     static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
     let name = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());

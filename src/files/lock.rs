@@ -1,4 +1,5 @@
-//! In: a folder. Out: the right to write into it, held by one process at a time and gone with it, however it ends.
+//! In: a folder. Out: the right to write into it. One process at a time holds it, and it is released however that
+//! process ends.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
@@ -6,18 +7,18 @@ use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// A lock of the operating system on the file `NAME.lock`, which stays: a file that is taken away while another process
-/// waits for it would give two of them the lock.
+/// A lock of the operating system on the file `NAME.lock`. The file is never removed: if it were removed while
+/// another process waits for it, two processes could get the lock.
 pub struct Lock {
     _file: File,
 }
 
-/// How long a lock is asked for. A process that this one is just starting holds copies of its open files until it has
-/// begun.
+/// How long the lock is retried. A child process that is just being started holds copies of this process's open
+/// files, and so of its locks, until it runs its own program.
 const PATIENCE: Duration = Duration::from_millis(400);
 
 impl Lock {
-    /// Refuses where another process holds it; `who` says what that process does here.
+    /// Returns an error if another process holds the lock; `who` says what that process does here.
     pub fn take(folder: &Path, name: &str, who: &str) -> Result<Lock> {
         let (path, file) = open(folder, name)?;
         let mut tried = file.try_lock();
@@ -40,7 +41,7 @@ impl Lock {
         }
     }
 
-    /// Waits for it.
+    /// Waits for the lock.
     pub fn wait(folder: &Path, name: &str) -> Result<Lock> {
         let (path, file) = open(folder, name)?;
         file.lock().map_err(|e| Fault::write(&path, e))?;
@@ -70,7 +71,7 @@ mod tests {
         let said = Lock::take(dir.path(), "scan", "scan").err().unwrap();
         assert!(said.what.contains("another scan") && !said.next.is_empty(), "{said}");
         drop(first);
-        // What it says inside, and who wrote it, is nobody's lock.
+        // Neither the content of the file nor its owner makes it a held lock.
         std::fs::write(dir.path().join("scan.lock"), "1").unwrap();
         Lock::take(dir.path(), "scan", "scan").unwrap();
     }

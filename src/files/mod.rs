@@ -1,6 +1,6 @@
-//! In: bytes of results and the names they are to have, paths of files that others wrote. Out: files that are whole
-//! or not there, sets of files that take their names together, folders that one process at a time writes into, names
-//! in the order people count in, bytes and text within limits, rows of tables, slips of the hand in them.
+//! In: bytes of results and their names, paths of files that others wrote. Out: files that are whole or missing,
+//! sets of files that get their names together, folders that one process at a time writes into. Also: names in
+//! natural order, bytes and text within size limits, rows of tables, likely typing errors in text files.
 //! Frame and unit: none; bytes and paths.
 
 mod append;

@@ -1,11 +1,12 @@
 //! In: the environment of a test run. Out: a process that dies, or a disk that is full, at the n-th file operation.
-//! Release builds hold nothing of it.
+//! Release builds do not contain this.
 //! Frame and unit: operations, counted from 1.
 
 use std::io::Result;
 
-/// Stands before every file operation that a result depends on. Under `SHEETLIGHT_DIE_AT=n` the n-th ends the process
-/// as a kill would, without unwinding; under `SHEETLIGHT_FULL_AT=n` it and all after it fail as on a full disk.
+/// Called before every file operation that a result depends on. Under `SHEETLIGHT_DIE_AT=n` the n-th call ends the
+/// process as a kill would, without unwinding. Under `SHEETLIGHT_FULL_AT=n` the n-th call and all later ones fail
+/// as on a full disk.
 #[cfg(debug_assertions)]
 pub fn moment() -> Result<()> {
     use std::sync::OnceLock;
@@ -25,7 +26,7 @@ pub fn moment() -> Result<()> {
     Ok(())
 }
 
-/// Nothing: builds for use are not stopped.
+/// Does nothing: release builds are not stopped.
 ///
 /// # Errors
 /// None.

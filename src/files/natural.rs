@@ -1,7 +1,7 @@
 //! In: file names. Out: a key that sorts them as people count: frame2 before frame10.
 //! Frame and unit: none.
 
-/// Text and numbers by turns; numbers compare by value, then by their zeros.
+/// Text and numbers alternately; numbers compare by value, then by their leading zeros.
 pub fn natural(name: &str) -> Vec<(String, u128, usize)> {
     let mut key = Vec::new();
     let mut rest = name;

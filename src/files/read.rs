@@ -1,18 +1,19 @@
-//! In: the path of a file that somebody else wrote. Out: its bytes or its text, never more of them than it may have,
-//! and never by waiting for a sender.
+//! In: the path of a file that another program or a person wrote. Out: its bytes or its text, within a size limit.
+//! It never waits for a sender.
 //! Frame and unit: bytes.
 
 use crate::fault::{Fault, Result};
 use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-/// Largest text that a program writes (poses, meta.json of a long recording).
+/// Largest text file that a program writes (poses, meta.json of a long recording).
 const MOST_TEXT: u64 = 64 << 20;
 
 /// The byte order mark.
 const MARK: char = '\u{feff}';
 
-/// Bytes of a file. A pipe, a device or a folder is none: its bytes may never come, or never end.
+/// Length of a file in bytes. Returns an error for a pipe, a device or a folder: its bytes may never come, or never
+/// end.
 pub fn length(path: &Path) -> Result<u64> {
     let found = std::fs::metadata(path).map_err(|e| Fault::read(path, e))?;
     if !found.is_file() {
@@ -24,10 +25,10 @@ pub fn length(path: &Path) -> Result<u64> {
     Ok(found.len())
 }
 
-/// The bytes of a file, refused where there are more than `most`.
+/// The bytes of a file. Returns an error if there are more than `most`.
 pub fn read(path: &Path, most: u64) -> Result<Vec<u8>> {
     let (found, mut bytes) = (length(path)?, Vec::new());
-    // It may grow meanwhile.
+    // The file may grow meanwhile.
     if found <= most {
         let read = std::fs::File::open(path).and_then(|f| f.take(most + 1).read_to_end(&mut bytes));
         read.map_err(|e| Fault::read(path, e))?;
@@ -41,7 +42,7 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The text of a file in UTF-8, without the mark that some editors put before it.
+/// The text of a UTF-8 file, without the byte order mark that some editors put before it.
 pub fn read_text(path: &Path) -> Result<String> {
     let text = String::from_utf8(read(path, MOST_TEXT)?);
     let mut text = text.map_err(|e| Fault::read(path, std::io::Error::new(ErrorKind::InvalidData, e.utf8_error())))?;
@@ -51,7 +52,7 @@ pub fn read_text(path: &Path) -> Result<String> {
     Ok(text)
 }
 
-/// [`read_text`], `None` where there is no such file.
+/// [`read_text`]; `None` if the file does not exist.
 pub fn read_text_if_there(path: &Path) -> Result<Option<String>> {
     match std::fs::metadata(path) {
         Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),

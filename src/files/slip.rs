@@ -1,16 +1,16 @@
-//! In: a text that a parser refused, and where. Out: the slip of the hand that it most likely is.
+//! In: a text that a parser refused, and the position of the error. Out: the most likely typing error.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
 
-/// What is likely wrong at a place (bytes from the start) of a text in TOML or JSON; `other` where nothing is known
-/// of it.
+/// The likely typing error at a position (bytes from the start) of a TOML or JSON text; `other` if none is
+/// recognised.
 pub fn slip_at<'a>(text: &str, place: usize, other: &'a str) -> &'a str {
     let before = text.get(..place).unwrap_or(text);
     slip_in(text, before.matches('\n').count() + 1, other)
 }
 
-/// [`slip_at`] a line, from 1.
+/// [`slip_at`] for a line number, counted from 1.
 pub fn slip_in<'a>(text: &str, line: usize, other: &'a str) -> &'a str {
     text.lines().nth(line.saturating_sub(1)).and_then(slip).unwrap_or(other)
 }
@@ -19,7 +19,7 @@ fn slip(line: &str) -> Option<&'static str> {
     let line = line.split('#').next().unwrap_or_default().trim();
     let (key, value) = match (line.split_once('='), line.split_once(':')) {
         (Some(parts), _) => parts,
-        // JSON's keys stand in quotes.
+        // JSON keys are quoted.
         (None, Some((key, _))) if !key.contains(['"', '{']) => return Some("a colon where TOML has ="),
         (None, Some(parts)) => parts,
         (None, None) => return None,
@@ -43,7 +43,7 @@ fn slip(line: &str) -> Option<&'static str> {
     (is_unit && number.parse::<f64>().is_ok()).then_some("a unit beside a number: the key's name shows the unit")
 }
 
-/// Refuses a name that cannot be part of a file's, or that would break the line it is written into.
+/// Returns an error for a name that cannot be part of a file name, or that would break the line it is written into.
 pub fn named(what: &str, name: &str) -> Result<()> {
     if !name.trim().is_empty()
         && name != "."

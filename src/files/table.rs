@@ -1,20 +1,20 @@
-//! In: the text of a table: a line a row, cells parted by a sign or by white space, quoted or not, lines of comment
-//! behind `#`. Out: its rows with the lines that they stand on.
+//! In: the text of a table: one row per line; cells separated by a character or by white space, quoted or not;
+//! comments after `#`. Out: its rows with their line numbers.
 //! Frame and unit: none; cells are text.
 
 /// A row of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableRow {
-    /// Of the text, counted from 1.
+    /// Line in the text, counted from 1.
     pub line: u64,
-    /// The line as it stands, without white space around it.
+    /// The line without white space around it.
     pub text: String,
-    /// Without white space and quotes around them.
+    /// The cells without white space and quotes around them.
     pub cells: Vec<String>,
 }
 
-/// Rows of any length, in order; empty lines and comments are none, and no row goes over a line's end. `separator` is
-/// one ASCII character; a space stands for any white space. A mark of the byte order says nothing in UTF-8.
+/// The rows, of any length, in order. Empty lines and comments are skipped, and no row spans several lines.
+/// `separator` is one ASCII character; a space stands for any white space. A byte order mark is ignored.
 pub fn table(text: &str, separator: char) -> Vec<TableRow> {
     let lines = (1..).zip(text.trim_start_matches('\u{feff}').lines().map(str::trim));
     let rows = lines.filter(|(_, l)| !l.is_empty() && !l.starts_with('#'));
@@ -32,7 +32,7 @@ fn cells(line: &str, separator: char) -> Vec<String> {
         .trim(csv::Trim::All)
         .delimiter(separator as u8)
         .buffer_capacity(line.len());
-    // Text in memory cannot fail to be read, and what is UTF-8 stays it: separators and quotes are ASCII.
+    // Reading text in memory cannot fail, and the cells stay valid UTF-8 because separators and quotes are ASCII.
     let record = reader.from_reader(line.as_bytes()).into_records().next().and_then(std::result::Result::ok);
     record.map_or_else(Vec::new, |r| r.iter().map(str::to_owned).collect())
 }

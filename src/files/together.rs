@@ -1,5 +1,5 @@
-//! In: files made in a folder of their own. Out: all of them under their names in the folder above, or none, whenever
-//! the program is stopped.
+//! In: files made in a separate folder. Out: all of them under their names in the folder above, or none of them,
+//! whenever the program is stopped.
 //! Frame and unit: none.
 
 use super::folder::sync_folder;
@@ -8,19 +8,19 @@ use crate::fault::{Fault, Result};
 use std::io::Result as Io;
 use std::path::{Path, PathBuf};
 
-/// A set of files that belong together, in `folder`. They are made in `NAME.part`. That folder's renaming to
-/// `NAME.whole` is the moment from which the new ones count: the former ones are put away, it becomes `NAME.moving`,
-/// and its files move up. Whoever reads the folder calls [`Together::settle`] first, which ends what a stopped
-/// process has begun.
+/// A set of files that belong together, in `folder`. They are made in `NAME.part`. The renaming of that folder to
+/// `NAME.whole` makes the new set valid. Then the old files are put away, `NAME.whole` becomes `NAME.moving`, and
+/// its files move up. A reader of the folder calls [`Together::settle`] first, which ends what a stopped process
+/// has begun.
 pub struct Together<'a> {
     folder: &'a Path,
     name: &'a str,
-    /// Puts away what the files in the second folder take the place of, in the first. Called again after a stop.
+    /// Puts away, in the first folder, what the files in the second folder replace. Called again after a stop.
     clear: fn(&Path, &Path) -> Io<()>,
 }
 
 impl<'a> Together<'a> {
-    /// Touches nothing yet. `clear(folder, new)` puts away in `folder` what the files in `new` take the place of.
+    /// Touches no files yet. `clear(folder, new)` puts away in `folder` what the files in `new` replace.
     pub fn new(folder: &'a Path, name: &'a str, clear: fn(&Path, &Path) -> Io<()>) -> Together<'a> {
         Together { folder, name, clear }
     }
@@ -29,12 +29,12 @@ impl<'a> Together<'a> {
         self.folder.join(format!("{}.{state}", self.name))
     }
 
-    /// Where the files are made.
+    /// The folder in which the files are made.
     pub fn part(&self) -> PathBuf {
         self.at("part")
     }
 
-    /// An empty folder to make the files in; what a stopped process has left there goes.
+    /// Creates an empty folder to make the files in; what a stopped process left there is removed.
     pub fn begin(&self) -> Result<PathBuf> {
         let part = self.part();
         let fresh = || {
@@ -51,8 +51,8 @@ impl<'a> Together<'a> {
         Ok(part)
     }
 
-    /// Gives the files in [`Together::part`], each of them on the disk already, their names. The caller holds the
-    /// folder's lock.
+    /// Gives the files in [`Together::part`] their names. Each file must be on the disk already. The caller holds
+    /// the folder's lock.
     pub fn commit(&self) -> Result<()> {
         let done = sync_folder(&self.part())
             .and_then(|()| rename(&self.part(), &self.at("whole")))
@@ -61,12 +61,12 @@ impl<'a> Together<'a> {
         done.map_err(|e| Fault::write(self.folder, e))
     }
 
-    /// Takes away what was made in [`Together::part`] where it could not be made whole. A commit that has begun stays.
+    /// Removes what was made in [`Together::part`] if it could not be completed. A commit that has begun stays.
     pub fn abandon(&self) {
         let _ = std::fs::remove_dir_all(self.part());
     }
 
-    /// Ends a commit that a stopped process has begun; does nothing where there is none.
+    /// Ends a commit that a stopped process has begun; does nothing if there is none.
     pub fn settle(&self) -> Result<()> {
         let begun = || self.at("whole").exists() || self.at("moving").exists();
         if !begun() {
@@ -76,7 +76,7 @@ impl<'a> Together<'a> {
         if begun() { self.roll().map_err(|e| Fault::write(self.folder, e)) } else { Ok(()) }
     }
 
-    /// [`Together::settle`] by one that holds the lock already.
+    /// [`Together::settle`] for a caller that already holds the lock.
     pub fn settle_locked(&self) -> Result<()> {
         self.roll().map_err(|e| Fault::write(self.folder, e))
     }
@@ -88,7 +88,7 @@ impl<'a> Together<'a> {
             rename(&whole, &moving)?;
         }
         if moving.exists() {
-            // Listed first: the list must not change while it is read.
+            // Listed first, because the list must not change while it is read.
             let names = std::fs::read_dir(&moving)?.map(|e| Ok(e?.file_name())).collect::<Io<Vec<_>>>()?;
             for name in names {
                 rename(&moving.join(&name), &self.folder.join(&name))?;

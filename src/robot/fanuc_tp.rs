@@ -5,14 +5,14 @@ use super::Convention;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Frame, Rigid};
 
-/// One position register of a program.
+/// One position of a program.
 #[derive(Clone, Debug)]
 pub struct TpPosition<To: Frame, From: Frame> {
     /// n of `P[n]`.
     pub number: u32,
-    /// The comment, where there is one: P[3:"over the ball"].
+    /// The comment, empty if there is none: P[3:"over the ball"].
     pub comment: String,
-    /// Numbers of the user frame and of the tool frame that the pose relates.
+    /// Number of the user frame, n of `UF : n`.
     pub user_frame: u32,
     /// Number of the tool frame, n of `UT : n`.
     pub tool_frame: u32,
@@ -20,10 +20,10 @@ pub struct TpPosition<To: Frame, From: Frame> {
     pub pose: Rigid<To, From>,
 }
 
-/// Reads every position of a listing, ascending by number. Joint positions, positions that were
-/// never taught (asterisks), a missing unit and doubled numbers are refused.
+/// Reads every position of a listing, ascending by number. Returns an error for joint positions, positions that
+/// were never taught (asterisks), a missing unit and duplicate numbers.
 pub fn read<To: Frame, From: Frame>(text: &str) -> Result<Vec<TpPosition<To, From>>> {
-    // Only the position section counts: comments in the program may look like positions.
+    // Only the position section is read, because comments in the program may look like positions.
     let section = text.find("/POS").map_or(text, |at| &text[at + 4..]);
     let section = section.find("/END").map_or(section, |at| &section[..at]);
     let mut out: Vec<TpPosition<To, From>> = Vec::new();
@@ -65,11 +65,11 @@ fn bad(what: String) -> Fault {
         .next("touch up the positions as Cartesian ones and export the program as .LS again")
 }
 
-/// One position: what stands in its brackets and in its braces.
+/// One position, from the text in its brackets and the text in its braces.
 fn position<To: Frame, From: Frame>(head: &str, body: &str) -> Result<TpPosition<To, From>> {
     let (number, comment) = head.split_once(':').unwrap_or((head, ""));
     let number: u32 = number.trim().parse().map_err(|_| bad(format!("P[{number}]: is not a position number")))?;
-    // Further motion groups (a positioner) follow the robot's.
+    // Further motion groups (a positioner) follow the robot's group.
     let group = body.find("GP2").map_or(body, |g| &body[..g]);
     if body.contains('*') {
         return Err(bad(format!("P[{number}]: was never taught (asterisks)")));

@@ -1,6 +1,6 @@
-//! In: poses as robots print them. Out: rigid transforms, and back; the convention is always named,
-//! never guessed (docs/conventions.md has the table).
-//! Frame and unit: whatever frames the caller names; each convention states its own units.
+//! In: poses as robots print them. Out: rigid transforms, and back. The convention is always named, never guessed
+//! (docs/conventions.md has the table).
+//! Frame and unit: the frames that the caller names; each convention states its units.
 
 pub mod fanuc_tp;
 pub mod program;
@@ -11,7 +11,8 @@ pub use written::Written;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Frame, Mat3, Rigid, Vec3, exp, log, repair};
 
-/// Figures of Denso: -1 to -3 leave the choice to the controller, five bits say shoulder, elbow, wrist, joints 6 and 4.
+/// Denso's figures: -1 to -3 leave the choice to the controller; five bits state shoulder, elbow, wrist, joints 6
+/// and 4.
 const FIGURES: std::ops::RangeInclusive<f64> = -3.0..=31.0;
 
 /// How a robot writes a pose as numbers.
@@ -57,10 +58,10 @@ pub enum Convention {
 }
 
 impl Convention {
-    /// All of them.
+    /// All conventions.
     pub const ALL: &[Convention] = <Convention as strum::VariantArray>::VARIANTS;
 
-    /// As options and files write it.
+    /// The name in options and files.
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -86,7 +87,8 @@ impl Convention {
         }
     }
 
-    /// Where the angles stand among the numbers, and whether they are degrees; none for quaternions and matrices.
+    /// The range of the angles among the numbers, and whether they are degrees; `None` for quaternions and
+    /// matrices.
     pub fn angles(self) -> Option<(std::ops::Range<usize>, bool)> {
         match self {
             Convention::Denso | Convention::Kuka | Convention::Fanuc | Convention::Yaskawa => Some((3..6, true)),
@@ -97,8 +99,8 @@ impl Convention {
         }
     }
 
-    /// Denso writes a figure behind a pose: which way round shoulder, elbow and wrist are. A pose without its joints
-    /// does not need it; what stands there must be one, though, or the numbers are in another order.
+    /// Denso appends the figure to a pose: the configuration of shoulder, elbow and wrist. A pose without joints
+    /// does not need it. But the number there must be a valid figure, or the numbers are in another order.
     fn without_figure(self, numbers: &[f64]) -> Result<&[f64]> {
         let (pose, figure) = match (self, numbers.split_last()) {
             (Convention::Denso, Some((figure, pose))) if pose.len() == 6 => (pose, *figure),
@@ -118,7 +120,7 @@ impl Convention {
         .next("write X Y Z RX RY RZ and the figure, or leave the figure out"))
     }
 
-    /// Refuses numbers that no robot's pose has.
+    /// Returns an error for numbers that no robot's pose has.
     fn believe(self, numbers: &[f64]) -> Result<()> {
         if numbers.iter().any(|x| !x.is_finite()) {
             return Err(Fault::input("a pose holds a number that is not finite")
@@ -126,7 +128,7 @@ impl Convention {
                 .next("export the pose again"));
         }
         if let Some((place, degrees)) = self.angles() {
-            // No wrist turns more often, whatever it counts.
+            // No wrist turns further, even if its count continues over several turns.
             let (limit, unit) = if degrees { (3600.0, "degrees") } else { (63.0, "radians") };
             if let Some(angle) = numbers[place].iter().find(|a| a.abs() > limit) {
                 return Err(Fault::input(format!("an angle of {angle:?} {unit}, at most {limit} are accepted"))
@@ -143,8 +145,8 @@ impl Convention {
         Ok(())
     }
 
-    /// Reads a pose. Wrong counts, numbers that are not finite and quaternions whose length is
-    /// off by more than 1e-2 are refused, and angles of more than ten turns.
+    /// Reads a pose. Returns an error for a wrong count, numbers that are not finite, quaternions whose length is
+    /// off by more than 1e-2, and angles of more than ten turns.
     pub fn read<To: Frame, From: Frame>(self, numbers: &[f64]) -> Result<Rigid<To, From>> {
         let want = self.labels().len();
         let numbers = self.without_figure(numbers)?;
@@ -176,7 +178,7 @@ impl Convention {
                 let (y, z) = (Vec3::new(r[0], r[1], r[2]), Vec3::new(r[3], r[4], r[5]));
                 repair(&Mat3::from_columns(&[y.cross(&z), y, z]))?.rotation
             }
-            // The transpose of Rz·Ry·Rx of the opposite angles.
+            // The transpose of Rz·Ry·Rx with the opposite angles.
             Convention::Gba => zyx_deg(-r[2], -r[1], -r[0]).transpose(),
             Convention::Kawasaki => zyx_deg(r[0], r[1], 0.0) * zyx_deg(r[2], 0.0, 0.0),
             Convention::Matrix => unreachable!("returned above"),
@@ -213,7 +215,7 @@ impl Convention {
     }
 }
 
-/// Largest size of a length with this label: a kilometre; `None` for what is no length.
+/// Largest magnitude of a length with this label: one kilometre; `None` if the label is not a length.
 fn most(label: &str) -> Option<f64> {
     match label.split_once(' ')?.1 {
         "mm" => Some(1e6),
@@ -249,7 +251,7 @@ fn zyz_of(r: &Mat3) -> [f64; 3] {
     let (o, t) = if a.sin() > 1e-9 {
         (r[(1, 2)].atan2(r[(0, 2)]), r[(2, 1)].atan2(-r[(2, 0)]))
     } else {
-        // At 180 degrees the x axis is mirrored.
+        // At 180 degrees the x axis is reversed.
         let s = a.cos().signum();
         ((s * r[(1, 0)]).atan2(s * r[(0, 0)]), 0.0)
     };
@@ -286,8 +288,8 @@ mod tests {
         }
     }
 
-    /// The paper's Table 2: its angles against its printed matrix, which has four decimals and is no
-    /// rotation until it is made orthonormal.
+    /// The paper's Table 2: its angles against its printed matrix, which has four decimals and is a rotation only
+    /// after it is made orthonormal.
     #[test]
     fn table_2_of_the_paper() {
         let angles = [-46.2089, 1.38484, 93.631, 359.941, 1.00457, 267.802];

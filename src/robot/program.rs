@@ -1,11 +1,11 @@
-//! In: the poses of an insertion. Out: the text of a program for a robot's own controller: approach, insertion,
-//! retract along straight lines.
-//! Frame and unit: the tool in the robot's base frame, mm; each language's own units in the text; speed mm/s.
+//! In: the poses of an insertion. Out: the text of a program for a robot's controller: approach, insertion, retract
+//! along straight lines.
+//! Frame and unit: the tool in the robot's base frame, mm; in the text the units of each language; speed mm/s.
 
 use super::Convention;
 use crate::geometry::{Base, Rigid, Tool};
 
-/// A robot's language.
+/// A robot programming language.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
 #[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Language {
@@ -22,7 +22,7 @@ pub enum Language {
 }
 
 impl Language {
-    /// All of them.
+    /// All languages.
     pub const ALL: &[Language] = <Language as strum::VariantArray>::VARIANTS;
 }
 
@@ -30,18 +30,18 @@ fn unknown(word: &str) -> String {
     crate::fault::unknown::<Language>("language", word)
 }
 
-/// Where the tool goes, in order.
+/// The tool's poses, in order.
 #[derive(Clone, Copy, Debug)]
 pub struct Insertion {
     /// Above the insertion.
     pub approach: Rigid<Base, Tool>,
-    /// Down.
+    /// The inserted pose.
     pub insertion: Rigid<Base, Tool>,
-    /// Back up.
+    /// Above the insertion, on the way back.
     pub retract: Rigid<Base, Tool>,
 }
 
-/// What the reader of each program has to know.
+/// What the reader of each program must know.
 const HEAD: [&str; 3] = [
     "Written by sheetlight. Poses: the inserting tool in the robot's base frame.",
     "Select that tool and the base (work frame 0) before this is run; check the way at reduced speed first.",
@@ -49,7 +49,7 @@ const HEAD: [&str; 3] = [
 ];
 const OPEN: &str = "open the gripper here";
 
-/// The program; `name` becomes its name as far as the language allows, `speed_mm_s` is that of the tool.
+/// The program's text. `name` becomes its name as far as the language allows; `speed_mm_s` is the tool's speed.
 pub fn program(language: Language, name: &str, at: &Insertion, speed_mm_s: f64) -> String {
     let name: String = name.chars().filter(char::is_ascii_alphanumeric).take(20).collect();
     let name = if name.starts_with(|c: char| c.is_ascii_alphabetic()) { name } else { format!("P{name}") };
@@ -65,9 +65,9 @@ pub fn program(language: Language, name: &str, at: &Insertion, speed_mm_s: f64) 
 
 type Named<'a> = [(&'static str, &'a Rigid<Base, Tool>); 3];
 
-/// Numbers with a fixed count of digits, parted.
+/// The pose's numbers as texts with a fixed count of digits.
 fn list(convention: Convention, pose: &Rigid<Base, Tool>, digits: usize) -> Vec<String> {
-    // -0.000 is a number that surprises people.
+    // Avoids "-0.000".
     let plain = |x: f64| format!("{:.digits$}", if x.abs() < 0.5 * 10f64.powi(-(digits as i32)) { 0.0 } else { x });
     convention.write(pose).into_iter().map(plain).collect()
 }
@@ -77,7 +77,7 @@ fn head(comment: &str) -> String {
 }
 
 fn pacscript(name: &str, poses: &Named, speed: f64) -> String {
-    // Straight motions of an RC8 are stated in per cent; what 100 % is depends on the arm.
+    // Straight motions of an RC8 are stated in per cent; the speed at 100 % depends on the arm.
     let mut out = head("'");
     out += &format!(
         "' Set the external speed so that a straight motion goes at {speed:.0} mm/s.\n' {name}\nSub Main\n  TakeArm \

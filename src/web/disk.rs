@@ -1,10 +1,10 @@
-//! In: a folder; this process. Out: how much its disk still takes; the memory that it has.
+//! In: a folder; this process. Out: the free space of its disk; the memory that the process uses.
 //! Frame and unit: GB of 10^9 bytes, MB of 10^6.
 
 use std::path::Path;
 use std::process::Command;
 
-/// Asks `df`, which every Unix has in the same form; `None` where there is none.
+/// Calls `df`, whose output has the same format on every Unix; `None` if it is missing.
 pub fn left_gb(folder: &Path) -> Option<f64> {
     let done = Command::new("df").arg("-Pk").arg(folder).output().ok()?;
     let text = String::from_utf8(done.stdout).ok()?;
@@ -12,7 +12,7 @@ pub fn left_gb(folder: &Path) -> Option<f64> {
     Some(available * 1024e-9)
 }
 
-/// Memory of this process, now and at its most; `None` where the system does not say it as Linux does.
+/// Memory of this process, now and at its peak; `None` if the system does not report it as Linux does.
 pub fn memory_mb() -> Option<[f64; 2]> {
     let text = std::fs::read_to_string("/proc/self/status").ok()?;
     let mb = |name: &str| {

@@ -1,4 +1,4 @@
-//! In: a simulated cell. Out: a station folder that fits it: the sensor's true calibration, a workspace, the tool.
+//! In: a simulated cell. Out: a station folder for it: the sensor's true calibration, a workspace, the tool.
 //! Frame and unit: base frame, mm.
 
 use crate::arm::rules::{Limits, Space};
@@ -9,11 +9,11 @@ use crate::robot::Convention;
 use crate::station::{Settings, ToolSpec};
 use std::path::Path;
 
-/// Where a VS-060 on its own table may work, mm.
+/// Workspace of a VS-060 on its table, mm.
 const WORKSPACE: Space = Space { from_mm: [150.0, -350.0, 200.0], to_mm: [650.0, 350.0, 750.0] };
 
-/// Writes calibrations and station.toml of a cell into `folder`; its link may be silent, and its poses
-/// stand, for `silence_ms`; `None`: as usual.
+/// Writes calibrations and station.toml of a cell into `folder`. `silence_ms` is how long its link may be silent
+/// and its reported pose may stay unchanged; `None`: the default limits.
 ///
 /// # Errors
 /// A file cannot be written.

@@ -1,4 +1,4 @@
-//! In: a job that found a part, a station's folder. Out: where the part lies, its drawing and the rig, kept for a
+//! In: a job that found a part, a station's folder. Out: the part's pose, its drawing and the rig, cached for a
 //! while.
 //! Frame and unit: base frame, mm.
 
@@ -11,10 +11,10 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant, SystemTime};
 
-/// Rig and part are read from the disk again after so long.
+/// Time after which rig and part are read from the disk again.
 const READ_AGAIN: Duration = Duration::from_secs(5);
 
-/// What was read last: pages ask for every picture.
+/// Cache of the last part: pages ask for it at every picture.
 #[derive(Default)]
 pub struct FoundParts(Mutex<Option<Read>>);
 
@@ -27,7 +27,7 @@ struct Read {
 }
 
 impl FoundParts {
-    /// A part by its job's name, with the rig as it is now.
+    /// A part by its job's name, with the present rig.
     pub fn read(&self, jobs: &Jobs, station: &Path, id: &str) -> Result<Arc<(Lies, Drawing, Rig)>> {
         let job = jobs.get(id)?;
         let written = report_of(jobs, &job)?.metadata().and_then(|m| m.modified()).ok();

@@ -1,5 +1,5 @@
-//! In: a job that found a part, a picture of the camera on the gripper, where the robot stood then. Out: the part's
-//! outlines over that picture, and how far they may be off because the arm moved.
+//! In: a job that found a part, a picture of the camera on the gripper, the robot's pose at that time. Out: the
+//! part's outlines over that picture, and how far the arm's motion may have shifted them.
 //! Frame and unit: base frame, mm; px of the picture.
 
 use super::message::{Ghost, Outlines};
@@ -9,10 +9,10 @@ use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use crate::station::ghost;
 
-/// When the camera's picture of this number was taken, ns of the host's clock.
+/// Time at which the camera's picture of this number was taken, ns of the host's clock.
 ///
 /// # Errors
-/// No camera, no robot, a picture that is long gone.
+/// No camera, no robot, or a picture that is too old.
 pub fn moment(screen: &Screen, number: u64) -> Result<u64> {
     let camera = screen.camera().ok_or_else(|| {
         Fault::input("no camera: the screen was served without --camera").next("start it with --camera URI")
@@ -25,15 +25,15 @@ pub fn moment(screen: &Screen, number: u64) -> Result<u64> {
     camera.moment(number).ok_or_else(|| Fault::input(format!("picture {number} is long gone")).next("take a newer one"))
 }
 
-/// Whether the robot's pose at that moment has been read, so that the ghost need not be guessed.
+/// Whether the robot's pose at that time has been read, so that the outlines need no guess.
 pub fn known(screen: &Screen, at_ns: u64) -> bool {
     screen.robot().is_some_and(|r| r.track().newest_ns().is_some_and(|t| t >= at_ns))
 }
 
-/// The part over the picture of that moment.
+/// The part's outlines over the picture of that time.
 ///
 /// # Errors
-/// Nothing found, no calibration, a robot whose pose then nobody read.
+/// No part was found, no calibration exists, or the robot's pose at that time was not read.
 pub fn over(screen: &Screen, id: &str, number: u64, at_ns: u64) -> Result<Ghost> {
     let about = screen.robot().and_then(|r| r.track().about(at_ns));
     let Some([before, after]) = about else {
@@ -48,8 +48,7 @@ pub fn over(screen: &Screen, id: &str, number: u64, at_ns: u64) -> Result<Ghost>
     Ok(Ghost { number, lines, moved_px })
 }
 
-/// The farthest that a point of the one lies from the same point of the other, px; as far as the picture is long
-/// where they are not alike.
+/// Largest distance between corresponding points of the two, px; `LOST` if they do not correspond.
 fn farthest(a: &[Vec<[f64; 2]>], b: &[Vec<[f64; 2]>]) -> f64 {
     const LOST: f64 = 1e4;
     if a.iter().map(Vec::len).ne(b.iter().map(Vec::len)) {
@@ -62,7 +61,7 @@ fn farthest(a: &[Vec<[f64; 2]>], b: &[Vec<[f64; 2]>]) -> f64 {
 /// The part's outlines in its scan's frame.
 ///
 /// # Errors
-/// As [`over`], but for camera and robot, which nobody needs for it.
+/// As for [`over`], except for camera and robot, which are not needed.
 pub fn outlines(screen: &Screen, id: &str) -> Result<Outlines> {
     let (lies, recipe) = lies(&screen.jobs, &screen.jobs.get(id)?)?;
     let lines = lies.outlines(&recipe.drawing());

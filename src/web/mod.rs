@@ -1,5 +1,5 @@
 //! In: a station's folder. Out: the operator's screen, served to browsers.
-//! One port; everything it does is a procedure of `station` that the command line has too.
+//! It uses one port. Everything it does is a procedure of `station` that the command line offers too.
 //! Frame and unit: as the procedures; texts show theirs.
 
 mod api;

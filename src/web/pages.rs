@@ -1,4 +1,4 @@
-//! In: the path of a page. Out: its file, which the program carries inside.
+//! In: the path of a page. Out: its file, which is embedded in the program.
 //! Frame and unit: none.
 
 use super::guard::plain;
@@ -21,7 +21,7 @@ fn kind(path: &str) -> Option<&'static str> {
     })
 }
 
-/// A file; `/` is the one page that shows all others. What is no plain name is not looked for.
+/// Serves a file; `/` is the page that shows all others. Invalid names are not looked up.
 pub async fn page(uri: Uri) -> Response {
     let path = match uri.path().trim_start_matches('/') {
         "" => "index.html",
@@ -32,7 +32,7 @@ pub async fn page(uri: Uri) -> Response {
         Some((file, kind)) => {
             let headers = [
                 (header::CONTENT_TYPE, HeaderValue::from_static(kind)),
-                // Asked for again each time: a newer program has newer pages.
+                // The browser must revalidate each time, because a newer program has newer pages.
                 (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),
             ];
             (headers, file.data).into_response()

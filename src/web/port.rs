@@ -1,5 +1,5 @@
-//! In: an address and a port. Out: somebody who listens there, or on the next free port; who has the one that was
-//! asked for.
+//! In: an address and a port. Out: a listener on it, or on the next free port; the name of the program that uses
+//! the requested one.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
@@ -7,13 +7,13 @@ use std::net::IpAddr;
 use std::path::Path;
 use tokio::net::TcpListener;
 
-/// Ports that are tried after the one that was asked for.
+/// Most ports that are tried after the requested one.
 const TRIES: u16 = 20;
 
-/// A port that is listened on, and where it is another than the one that was asked for: why, in a sentence.
+/// A listener, and if its port is not the requested one, a sentence that says why.
 ///
 /// # Errors
-/// None of them can be had.
+/// None of the ports is available.
 pub(super) async fn listen(address: IpAddr, asked: u16, next_free: bool) -> Result<(TcpListener, Option<String>)> {
     let most = if next_free && asked > 0 { TRIES } else { 1 };
     let mut failed = None;
@@ -34,12 +34,12 @@ pub(super) async fn listen(address: IpAddr, asked: u16, next_free: bool) -> Resu
         .next("choose another --port; 0 takes any that is free"))
 }
 
-/// By whom a port is taken, where this machine says it: other people's programs stay unnamed.
+/// Which program uses a port, if this machine reveals it; programs of other users are not named.
 fn by(port: u16) -> String {
     holder(port, Path::new("/proc")).map_or_else(String::new, |who| format!(" by {who}"))
 }
 
-/// Name and number of the program that listens on a port, by what Linux shows of processes.
+/// Name and number of the process that listens on a port, from Linux's /proc.
 fn holder(port: u16, proc: &Path) -> Option<String> {
     let socket = |inode: &str| format!("socket:[{inode}]");
     let sockets: Vec<String> = ["net/tcp", "net/tcp6"]
@@ -59,7 +59,7 @@ fn holder(port: u16, proc: &Path) -> Option<String> {
     Some(format!("{} (process {number})", name.trim()))
 }
 
-/// The inode of a line of net/tcp whose socket listens on this port.
+/// The inode of a line of net/tcp if its socket listens on this port.
 fn listening(line: &str, port: u16) -> Option<&str> {
     const LISTENS: &str = "0A";
     let words: Vec<&str> = line.split_whitespace().collect();

@@ -1,5 +1,4 @@
-//! In: a robot's URI. Out: what its controller says, read over and over on a thread of its own; a link that breaks is
-//! opened again.
+//! In: a robot's URI. Out: the state of its controller, polled on a separate thread; a broken link is reopened.
 //! Frame and unit: poses base_from_flange, mm.
 
 use super::message::RobotState;
@@ -13,25 +12,25 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
-/// The pose is read so often.
+/// Interval at which the pose is read.
 const READ: Duration = Duration::from_millis(100);
-/// The state is read with every so many of them.
+/// The state is read with every n-th pose.
 const STATE: u32 = 5;
-/// A link that broke is opened again after so long.
+/// Time after which a broken link is reopened.
 const AGAIN: Duration = Duration::from_secs(2);
 
-/// What is known of the robot.
+/// The last known state of the robot.
 #[derive(Clone, Debug, Default)]
 pub struct Seen {
-    /// None: no link.
+    /// `None`: no link.
     pub state: Option<State>,
-    /// Why there is none, or what stands on the controller.
+    /// Why there is no link, or what the controller reports as wrong.
     pub wrong: Option<String>,
-    /// Line or pointer is on, by the controller's outputs; None: the link cannot say.
+    /// Line or pointer is on, by the controller's outputs; `None`: the link does not report it.
     pub laser: Option<bool>,
 }
 
-/// A robot that is looked at, over a link of its own; it is moved from [`super::motion`].
+/// A robot that is watched over a separate link; it is moved from [`super::motion`].
 pub struct Robot {
     seen: Arc<Mutex<Seen>>,
     track: Arc<Mutex<Track>>,
@@ -39,9 +38,9 @@ pub struct Robot {
 }
 
 impl Robot {
-    /// Begins to look, at the outputs that the station names too. The robot need not be there yet.
+    /// Starts watching the robot, and the outputs that the station names. The robot need not be connected yet.
     pub fn watch(uri: &str, station: &Path) -> Result<Robot> {
-        // Poses of a file have no times: none of them is that of a picture.
+        // Poses from a file have no times, so none of them can be assigned to a picture.
         let timed = !matches!(uri.parse::<RobotUri>()?, RobotUri::File(_));
         let (seen, ended) = (Arc::new(Mutex::new(Seen::default())), Arc::new(AtomicBool::new(false)));
         let track = Arc::new(Mutex::new(Track::default()));
@@ -60,12 +59,12 @@ impl Robot {
         Ok(Robot { seen, track, ended })
     }
 
-    /// Where the flange was.
+    /// The flange's poses over time.
     pub fn track(&self) -> MutexGuard<'_, Track> {
         self.track.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// What was seen last.
+    /// The last known state.
     pub fn seen(&self) -> Seen {
         self.seen.lock().unwrap_or_else(|e| e.into_inner()).clone()
     }
@@ -102,7 +101,7 @@ fn look(
     Ok(())
 }
 
-/// Reads the state and tells it.
+/// Reads the state and stores it.
 fn state(arm: &mut dyn Arm, outputs: &Outputs, tell: &Mutex<Seen>) -> Result<()> {
     let state = arm.state()?;
     let lit: Vec<bool> = [outputs.line, outputs.pointer].into_iter().filter_map(|n| arm.signal(n).ok()).collect();
@@ -121,7 +120,7 @@ fn state(arm: &mut dyn Arm, outputs: &Outputs, tell: &Mutex<Seen>) -> Result<()>
 }
 
 impl Seen {
-    /// As the bar shows it.
+    /// The state that the bar shows.
     pub fn bar(&self, armed: bool, moving: bool) -> RobotState {
         match &self.state {
             Some(s) if moving || s.busy == Some(true) => RobotState::Moving,

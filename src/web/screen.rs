@@ -1,4 +1,4 @@
-//! In: a station. Out: everything that its screen knows, in one place that all requests share.
+//! In: a station. Out: the state of its screen, in one place that all requests share.
 //! Frame and unit: seconds, GB.
 
 use super::camera::Camera;
@@ -19,44 +19,44 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
-/// Jobs that a page gets to see at once.
+/// Most jobs that a page gets at once.
 pub const JOBS: usize = 200;
-/// What is read from the disk for the bar is read again after so long.
+/// Time after which the bar's data are read from the disk again.
 const READ_AGAIN: Duration = Duration::from_secs(10);
-/// Below this the bar alarms, GB.
+/// Free disk space below which the bar shows an alarm, GB.
 const LITTLE_DISK: f64 = 2.0;
 
-/// What all requests share.
+/// State that all requests share.
 pub struct Screen {
-    /// Where things lie.
+    /// Folders of the station.
     pub place: Place,
-    /// What runs, and what ran.
+    /// Running and finished jobs.
     pub jobs: Arc<Jobs>,
-    /// Who looks on.
+    /// The viewers.
     pub hub: Arc<Hub>,
-    /// Who is let in.
+    /// The open sessions.
     pub sessions: Arc<Sessions>,
-    /// Who operates.
+    /// The lease of the tab that operates.
     pub leases: Leases,
-    /// What moves the robot, and who confirms it.
+    /// The robot's motions, and their confirmation.
     pub desk: Arc<Desk>,
-    /// The password, where others than this machine may ask.
+    /// The password, if other machines may connect.
     pub password: Option<Tries>,
     /// Name of the cookie.
     pub cookie: String,
-    /// Corners in calibrations' pictures.
+    /// Detected corners in calibration pictures.
     pub views: Views,
     /// Parts that are drawn over the camera's pictures.
     pub found: FoundParts,
-    /// Height maps as they are looked at.
+    /// Height maps with their filters.
     pub maps: Maps,
-    /// When the program started.
+    /// Time at which the program started.
     pub started: Instant,
     adapter: OnceLock<(String, bool)>,
     read: Mutex<Option<Read>>,
 }
 
-/// What the bar shows of the disk.
+/// The data from the disk that the bar shows.
 #[derive(Clone)]
 struct Read {
     at: Instant,
@@ -67,7 +67,7 @@ struct Read {
 }
 
 impl Screen {
-    /// Nothing is read from the disk yet.
+    /// A screen that has read nothing from the disk yet.
     pub fn new(jobs: Arc<Jobs>, sessions: Arc<Sessions>, cookie: String, password: Option<Tries>) -> Screen {
         Screen {
             place: jobs.place.clone(),
@@ -87,17 +87,17 @@ impl Screen {
         }
     }
 
-    /// The camera, where one was named.
+    /// The camera, if one is configured.
     pub fn camera(&self) -> Option<&Arc<Camera>> {
         self.desk.links.camera.as_ref()
     }
 
-    /// The robot, where one was named.
+    /// The robot, if one is configured.
     pub fn robot(&self) -> Option<&Arc<Robot>> {
         self.desk.links.watched.as_ref()
     }
 
-    /// Asks the system for its adapters, once; the first time takes a moment.
+    /// The system's adapter, queried once; the first query takes a moment.
     pub fn adapter(&self) -> &(String, bool) {
         self.adapter.get_or_init(|| match adapters().first() {
             Some(a) if a.kind == "CPU" => (format!("{} cores", rayon::current_num_threads()), true),
@@ -124,13 +124,13 @@ impl Screen {
         read
     }
 
-    /// What was read of the station is read again: something was stored.
+    /// Discards what was read of the station, because something was stored there.
     pub fn forget(&self) {
         *self.read.lock().unwrap_or_else(|e| e.into_inner()) = None;
         self.camera().inspect(|c| c.renew());
     }
 
-    /// The bar as it stands.
+    /// The bar in its present state.
     pub fn bar(&self) -> Bar {
         let read = self.read();
         let (adapter, software) = self.adapter().clone();
@@ -170,12 +170,12 @@ impl Screen {
         }
     }
 
-    /// Everything that a viewer starts from.
+    /// The complete state for a new viewer.
     pub fn state(&self) -> Event {
         Event::State { bar: self.bar(), jobs: self.jobs.list(JOBS), motion: Box::new(self.desk.state()) }
     }
 
-    /// The height map of a scan through the filters that it is looked at with.
+    /// The height map of a scan with the filters for viewing it.
     pub fn look(&self, id: &str) -> Result<Looked> {
         self.maps.look(&self.scan(id)?)
     }

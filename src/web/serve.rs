@@ -1,4 +1,5 @@
-//! In: a station, an address. Out: its screen, served until the program is told to end; what runs then is kept.
+//! In: a station, an address. Out: its screen, served until the program is asked to end; the state of a running job
+//! is stored.
 //! Frame and unit: none.
 
 use super::api::router;
@@ -24,7 +25,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use tokio::runtime::{Builder, Runtime};
 
-/// What guards a screen that other machines may open.
+/// Protection of a screen that other machines may open.
 #[derive(Clone, Debug)]
 pub struct Secured {
     /// Argon2 hash of the password, as a PHC string.
@@ -33,30 +34,30 @@ pub struct Secured {
     pub certificates: PathBuf,
     /// Its private key, PEM.
     pub key: PathBuf,
-    /// Names by which browsers call this machine, beside the address that they connect to.
+    /// Names by which browsers call this machine, in addition to the address that they connect to.
     pub names: Vec<String>,
 }
 
-/// How a screen is served.
+/// Options for serving a screen.
 #[derive(Clone, Debug)]
 pub struct ServeOptions {
     /// Folder of the station.
     pub station: PathBuf,
-    /// Folder below which recordings lie.
+    /// Folder that contains the recordings.
     pub recordings: PathBuf,
-    /// Where pictures come from.
+    /// Source of the pictures.
     pub mode: Mode,
-    /// Address to listen on; others than this machine's own need `secured`.
+    /// Address to listen on; addresses that other machines can reach need `secured`.
     pub address: IpAddr,
-    /// 0: any that is free.
+    /// 0: any free port.
     pub port: u16,
-    /// The next free port is taken where this one is in use.
+    /// Use the next free port if this one is in use.
     pub next_free: bool,
-    /// A camera's URI, and what frames on standard input are like.
+    /// A camera's URI, and the format of frames on standard input.
     pub camera: Option<(String, Option<RawFormat>)>,
     /// A robot's URI.
     pub robot: Option<String>,
-    /// It may be moved: --allow-motion.
+    /// The robot may be moved: --allow-motion.
     pub may_move: bool,
     /// Password and TLS.
     pub secured: Option<Secured>,
@@ -66,18 +67,18 @@ pub struct ServeOptions {
     pub stop: Arc<AtomicBool>,
 }
 
-/// How often is looked whether the server is to end.
+/// Interval at which the server checks whether to end.
 const LOOK: Duration = Duration::from_millis(100);
-/// The bar is told so often.
+/// Interval at which the bar is sent.
 const BAR: Duration = Duration::from_secs(1);
 
-/// Serves until `stop`; `simulated` is the cell that robot and camera are of, where it is one of ours. `ready` is
-/// told the address to open, with the token of this start behind `#`, and where its port is another than was asked
-/// for why.
+/// Serves until `stop`. `simulated` is the cell to which robot and camera belong, if they are simulated. `ready`
+/// gets the address to open, with the token of this start after `#`, and the reason if the port is not the
+/// requested one.
 ///
 /// # Errors
-/// A station that is none or in use by another server, an address that cannot be listened on or is not guarded, bad
-/// TLS files.
+/// An invalid station or one that another server uses, an address that is unavailable or unprotected, invalid TLS
+/// files.
 pub fn serve(
     options: &ServeOptions,
     simulated: Option<SimulatedRobot>,
@@ -107,16 +108,16 @@ pub fn serve(
     let jobs = Jobs::open(place, hub, desk)?;
     let worker = Worker::start(jobs.clone())?;
     let served = runtime.block_on(run(options, token, jobs, ready));
-    // The job that runs ends with its checkpoint before the program does.
+    // The running job ends with its checkpoint before the program does.
     worker.close();
     runtime.shutdown_timeout(Duration::from_secs(2));
     served
 }
 
-/// Threads for work that takes long: pictures, clouds, the disk.
+/// Number of threads for slow work: pictures, clouds, the disk.
 const WORKERS: usize = 8;
 
-/// Two threads that answer, and those that work.
+/// Two threads for requests, and the worker threads.
 fn runtime() -> Result<Runtime> {
     let threads = Builder::new_multi_thread().worker_threads(2).max_blocking_threads(WORKERS).enable_all().build();
     threads.map_err(|e| Fault::threads(&e))
@@ -165,7 +166,7 @@ async fn run(
     let app = app.into_make_service_with_connect_info::<Peer>();
     let doorway = Doorway::new(listener, acceptor).map_err(lost)?;
     let first = screen.clone();
-    // Adapters are asked for before the first page needs them.
+    // Adapters are queried before the first page needs them.
     tokio::task::spawn_blocking(move || first.bar());
     tokio::spawn(bars(screen));
     ready(&format!("{url}/#token={token}"), instead.as_deref())?;
@@ -187,7 +188,7 @@ fn hosts(options: &ServeOptions) -> Result<Hosts> {
     Hosts::new(secured.is_some(), secured.map_or(&[][..], |s| &s.names))
 }
 
-/// Tells the bar, while anybody looks on.
+/// Sends the bar while there are viewers.
 async fn bars(screen: Arc<Screen>) {
     let mut tick = tokio::time::interval(BAR);
     tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
@@ -214,19 +215,19 @@ mod tests {
     use std::sync::mpsc::channel;
     use std::time::Instant;
 
-    /// Browsers that look on, what each asks for beside its socket, and connections that say nothing.
+    /// Number of viewers; of further requests per viewer; of idle connections.
     const VIEWERS: usize = 50;
     const GALLERY: usize = 6;
     const IDLE: usize = 300;
-    /// What sleeps never wakes: whatever waits for it waits for longer than this.
+    /// Longest wait for an answer; the sleeping workers never wake within it.
     const PATIENCE: Duration = Duration::from_secs(30);
-    /// A motion takes longer than any STOP, mm/s.
+    /// Speed at which a motion takes longer than any STOP, mm/s.
     const SLOWLY: f64 = 20.0;
 
     struct Client(String);
 
     impl Client {
-        /// A request that is sent; its answer may be waited for.
+        /// Sends a request; the caller may read the answer.
         fn sends(&self, method: &str, path: &str, more: &str) -> TcpStream {
             let mut stream = TcpStream::connect(&self.0).unwrap();
             stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -244,7 +245,7 @@ mod tests {
         }
     }
 
-    /// When the cell's log says so for the first time after this many entries.
+    /// Time of the first matching entry of the cell's log after this many entries.
     fn when(cell: &Cell, known: usize, what: impl Fn(&Happened) -> bool) -> f64 {
         let until = Instant::now() + PATIENCE;
         loop {
@@ -256,7 +257,7 @@ mod tests {
         }
     }
 
-    /// A motion of a job, as slow as it may be, that somebody halts; gives why it ended.
+    /// A job's slow motion that another thread halts; returns why it ended.
     fn moves(desk: &Desk) -> String {
         desk.looked().unwrap();
         let mut session = Session::begin(desk, "0001-insert", &Arc::default()).unwrap();
@@ -270,9 +271,9 @@ mod tests {
         guard.make(&proposal, yes, &mut |_, _| Ok(())).unwrap_err().what
     }
 
-    /// STOP reaches the controller although every worker sleeps for ever, viewers wait for their galleries and more
-    /// connections than there are places say nothing; pages are answered meanwhile. How long it takes depends on the
-    /// machine: it is printed, and judged in the long form alone.
+    /// STOP reaches the controller although every worker sleeps without end, viewers wait for their galleries, and
+    /// more connections than slots are idle. Pages are answered meanwhile. The time depends on the machine: it is
+    /// printed, and checked only in the long test.
     #[test]
     fn stop_reaches_the_controller_whatever_else_is_asked() {
         let long = std::env::var_os("SHEETLIGHT_LONG").is_some();
@@ -318,7 +319,7 @@ mod tests {
         let url = told.recv_timeout(PATIENCE).unwrap();
         let client = Client(url["http://".len()..].split('/').next().unwrap().to_owned());
 
-        // Every worker sleeps. The first bar may still be made: it comes before them.
+        // Every worker sleeps. The first bar may still be made, because it comes before them.
         let (asleep, sleeping) = channel();
         let wake: Vec<_> = (0..WORKERS)
             .map(|_| {
@@ -355,7 +356,7 @@ mod tests {
                     let pressed = cell.clock().now();
                     assert_eq!(client.asks("POST", "/api/v1/stop"), "HTTP/1.1 200 OK");
                     let halted = when(&cell, known, |e| matches!(e, Happened::Halt { moving: true, .. }));
-                    // Where the machine stands still for seconds the link's own silence may halt first.
+                    // If the machine stalls for seconds, the link's silence may halt the arm first.
                     (moving.join().unwrap() == "STOP was pressed").then_some((halted - pressed) * 1e3)
                 })
             })

@@ -1,5 +1,5 @@
-//! In: what an operator changes of the station. Out: its station.toml changed, backed up before, or a refusal;
-//! backups and the way back.
+//! In: an operator's changes to the station. Out: the changed station.toml, with a backup made before, or an error;
+//! backups and restoring them.
 //! Frame and unit: none.
 
 use super::message::{BackupInfo, SettingsAsk, SettingsState};
@@ -12,10 +12,10 @@ use crate::station::{Backup, Settings, back_up_here, backups, edited};
 use crate::web::guard::resolve;
 use std::collections::BTreeMap;
 
-/// Backups that are listed.
+/// Most backups that are listed.
 const MOST: usize = 100;
 
-/// As they stand on the disk.
+/// The settings as stored on the disk.
 pub fn state(screen: &Screen) -> Result<SettingsState> {
     let place = &screen.place;
     let text = crate::files::read_text(&place.station.join("station.toml"))?;
@@ -50,10 +50,10 @@ fn listed(screen: &Screen) -> Vec<BackupInfo> {
     names.into_iter().take(MOST).filter_map(info).collect()
 }
 
-/// Changes them; the former ones lie in a backup.
+/// Changes the settings; the previous ones are in a backup.
 ///
 /// # Errors
-/// Settings that cannot be; a text that was changed by another meanwhile; while a job runs or the robot is armed.
+/// Invalid settings; a text that was changed elsewhere meanwhile; a running job or an armed robot.
 pub fn change(screen: &Screen, ask: &SettingsAsk) -> Result<SettingsState> {
     free(screen)?;
     let path = screen.place.station.join("station.toml");
@@ -79,13 +79,13 @@ pub fn change(screen: &Screen, ask: &SettingsAsk) -> Result<SettingsState> {
     state(screen)
 }
 
-/// Backs the station up into its own folder.
+/// Backs the station up into its folder.
 pub fn back_up(screen: &Screen) -> Result<SettingsState> {
     back_up_here(&screen.place.station, "by-hand")?;
     state(screen)
 }
 
-/// Puts the station into the state of one of its backups; the present one is backed up before.
+/// Restores the station from one of its backups; its present state is backed up before.
 pub fn restore(screen: &Screen, name: &str) -> Result<SettingsState> {
     free(screen)?;
     let backup = Backup::load(&resolve(&backups(&screen.place.station), name)?)?;
@@ -95,14 +95,14 @@ pub fn restore(screen: &Screen, name: &str) -> Result<SettingsState> {
     state(screen)
 }
 
-/// One of them, to keep elsewhere.
+/// The bytes of a backup, to store elsewhere.
 pub fn backup(screen: &Screen, name: &str) -> Result<Vec<u8>> {
     let path = resolve(&backups(&screen.place.station), name)?;
     Backup::load(&path)?;
     crate::files::read(&path, 64 << 20)
 }
 
-/// Refuses while something works with the settings as they are.
+/// Returns an error while the present settings are in use.
 fn free(screen: &Screen) -> Result<()> {
     if let Some(job) = screen.jobs.running() {
         return Err(Fault::refused(format!("{job} runs"))

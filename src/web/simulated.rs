@@ -1,5 +1,5 @@
-//! In: a folder. Out: a simulated cell that runs in this process, a station in the folder that fits it, and
-//! recordings to scan, made once: a first look at the product without camera, robot or GPU.
+//! In: a folder. Out: a simulated cell that runs in this process, a station for it in the folder, and recordings to
+//! scan, made once. Shows the product without camera, robot or GPU.
 //! Frame and unit: as recordings; px.
 
 use super::for_cell::station_for;
@@ -8,27 +8,27 @@ use crate::fault::Result;
 use crate::simulate::{Set, SimulateOptions, simulate};
 use std::path::{Path, PathBuf};
 
-/// Cell and controller share this machine with everything else that runs on it: their link may be silent for so long,
-/// ms.
+/// Longest silence of the link to the controller, ms: cell and controller share this machine with all other
+/// programs.
 const SILENCE_MS: f64 = 2000.0;
 
-/// What is simulated.
+/// Options of the simulation.
 #[derive(Clone, Debug)]
 pub struct SimulatedOptions {
     /// Shots of the recorded scan.
     pub shots: usize,
-    /// Recordings beside the cell.
+    /// Recordings made in addition to the cell.
     pub sets: Vec<Set>,
     /// Part whose component the gripper holds: led, osc, flash or dimm.
     pub part: String,
-    /// Specimen, places and noise.
+    /// Seed of specimen, poses and noise.
     pub seed: u64,
-    /// Seconds of the cell in one of ours, 0.1 to 1000.
+    /// Seconds of the cell per real second, 0.1 to 1000.
     pub speed: f64,
 }
 
-/// Starts the cell, and makes `folder/station` and recordings beside it where they are not there yet; `progress`
-/// counts pictures. Gives the station.
+/// Starts the cell. Makes `folder/station` and recordings beside it if they do not exist yet; `progress` counts
+/// pictures. Returns the station.
 pub fn simulated(
     folder: &Path,
     options: &SimulatedOptions,
@@ -37,7 +37,7 @@ pub fn simulated(
     crate::files::make_folder(folder)?;
     let station = folder.join("station");
     let robot = SimulatedRobot::start(folder, &options.part, options.seed, options.speed)?;
-    // Its settings come last, so that a station that has them is whole.
+    // station.toml is written last, so that a station that has it is complete.
     if !station.join("station.toml").is_file() {
         if !options.sets.is_empty() {
             let (sets, shots) = (options.sets.clone(), options.shots);

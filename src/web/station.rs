@@ -1,4 +1,5 @@
-//! In: a station's folder. Out: what pages say of it: settings, calibrations with their age and what they make expect.
+//! In: a station's folder. Out: the data that pages show of it: settings, calibrations with their age and the
+//! expected error.
 //! Frame and unit: mm, days.
 
 use super::message::{CalibrationAge, CalibrationState, FrameInfo, Problem, StationInfo};
@@ -10,10 +11,10 @@ use jiff::{Timestamp, Unit};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// Figures in which calibrations state what they make expect at the working distance, mm.
+/// Figures in which calibrations state the error expected at the working distance, mm.
 const EXPECTED: [&str; 2] = ["expected_error_at_working_distance_mm", "expected_point_error_mm"];
 
-/// What the bar calls the covariance of all records together.
+/// Name in the bar of the joint covariance of all records.
 const JOINT: &str = "joint covariance";
 
 fn days_since(created: &str) -> f64 {
@@ -33,13 +34,14 @@ fn state(record: &Record) -> CalibrationState {
     }
 }
 
-/// Every calibration that there is.
+/// All existing calibrations.
 pub fn calibrations(rig: &Rig) -> Vec<CalibrationState> {
     rig.records().iter().map(state).collect()
 }
 
-/// What the bar says of them; none without camera, laser plane and what carries them. The worst record decides. A
-/// joint.json that is not of the station's records makes them usable at best: their common errors are no longer known.
+/// The bar's summary of the calibrations; `None` without a camera, a laser plane and the calibration of the motion
+/// that carries them. The worst record decides. If joint.json does not match the station's records, the verdict is
+/// usable at best, because the common errors are unknown.
 pub fn age(rig: &Rig) -> Option<CalibrationAge> {
     let carried =
         rig.hand_eye.is_some() || rig.base_camera.is_some() || rig.linear_axis.is_some() || rig.turntable.is_some();
@@ -55,7 +57,7 @@ pub fn age(rig: &Rig) -> Option<CalibrationAge> {
     Some(CalibrationAge { days, verdict: verdict.words().into(), worst, expected_mm: expected })
 }
 
-/// The station as it stands on the disk now.
+/// The station as stored on the disk now.
 pub fn info(place: &Place) -> StationInfo {
     let settings = Settings::load(&place.station);
     let rig = Rig::load(&place.station);
@@ -82,7 +84,7 @@ pub fn info(place: &Place) -> StationInfo {
     }
 }
 
-/// Frame of what is scanned.
+/// Frame of scans.
 fn work_frame(rig: &Rig) -> &'static str {
     if rig.hand_eye.is_some() || rig.base_camera.is_some() {
         "base"
@@ -93,7 +95,7 @@ fn work_frame(rig: &Rig) -> &'static str {
     }
 }
 
-/// Tool and camera where they are fixed.
+/// Poses of tool and camera where they are fixed.
 fn frames(settings: &Settings, rig: &Rig) -> Vec<FrameInfo> {
     let robot = settings.robot.unwrap_or(Convention::Matrix);
     let info = |name: &str, on: &str, numbers: Vec<f64>| FrameInfo {
@@ -108,7 +110,7 @@ fn frames(settings: &Settings, rig: &Rig) -> Vec<FrameInfo> {
     [tool, riding, standing].into_iter().flatten().collect()
 }
 
-/// Groups of settings as names with dots.
+/// Flattens groups of settings into dotted names.
 pub(super) fn flatten(before: &str, value: &Value, out: &mut BTreeMap<String, Value>) {
     match value {
         Value::Object(map) => {
@@ -135,7 +137,7 @@ mod tests {
         Quality { verdict, ..Station::random(1).calibrations(None).camera.unwrap().quality }
     }
 
-    /// A rig of good records, and one of each other kind with this verdict.
+    /// A rig of good records, and one rig for each kind whose record has this verdict.
     fn rig(verdict: Verdict) -> Vec<(Kind, Rig)> {
         let whole = || Station::random(1).calibrations(None);
         let camera = whole().camera;

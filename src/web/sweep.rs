@@ -1,6 +1,6 @@
-//! In: a recipe, the station, where the robot stands, what the camera sends, what was measured of it. Out: the sweep
-//! that a job would make, and how fast a scan along it goes.
-//! Frame and unit: poses in the robot's own notation; mm, mm/s, pictures a second.
+//! In: a recipe, the station, the robot's pose, the camera's frame rate, the measured rate. Out: the sweep that a
+//! job would make, and how fast a scan along it goes.
+//! Frame and unit: poses in the robot's convention; mm, mm/s, frame rates in Hz.
 
 use super::message::{JobState as State, Order, Outcome, SweepAsk, SweepPlan};
 use super::screen::{JOBS, Screen};
@@ -11,10 +11,10 @@ use crate::robot::Convention;
 use crate::station::Settings;
 use crate::station::job::{JobState, PreviewOptions, preview};
 
-/// Plans it; nothing moves.
+/// Plans the sweep; nothing moves.
 ///
 /// # Errors
-/// Those of [`preview`]; no such recipe or job.
+/// Those of [`preview`]; an unknown recipe or job.
 pub fn sweep(screen: &Screen, ask: &SweepAsk) -> Result<SweepPlan> {
     let station = &screen.place.station;
     let (settings, rig) = (Settings::load(station)?, Rig::load(station)?);
@@ -40,7 +40,7 @@ pub fn sweep(screen: &Screen, ask: &SweepAsk) -> Result<SweepPlan> {
     Ok(SweepPlan::of(preview(&settings, &rig, &recipe, &options)?, robot))
 }
 
-/// Shots a second of the newest scan of pictures of this size.
+/// Shots per second of the newest scan with pictures of this size.
 fn measured(screen: &Screen, size: [u32; 2]) -> Option<f64> {
     screen.jobs.list(JOBS).iter().find_map(|j| match (&j.order, &j.outcome) {
         (Order::Scan(_), Some(Outcome::Scan(f))) if j.state == State::Done && [f.width, f.height] == size => {

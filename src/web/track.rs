@@ -1,16 +1,16 @@
-//! In: poses of the flange as they are read. Out: where it stood when a picture was taken, and how far it moved about
-//! then.
+//! In: poses of the flange as they are read. Out: its pose when a picture was taken, and how far it moved around
+//! that time.
 //! Frame and unit: base_from_flange, mm; ns of the host's clock.
 
 use crate::geometry::{Base, Flange, Rigid};
 use std::collections::VecDeque;
 
-/// Readings that are kept: a minute of motion; while the arm stands one reading grows.
+/// Most readings that are stored: a minute of motion; while the arm stands still one reading is extended.
 const MOST: usize = 600;
-/// An arm that stands reads the same to this, mm and radians.
+/// Readings that differ by no more than this count as the same, mm and radians.
 const STANDS: f64 = 1e-3;
 
-/// One reading, or many that were the same.
+/// One reading, or several equal ones.
 #[derive(Clone, Copy, Debug)]
 struct Stood {
     from_ns: u64,
@@ -18,12 +18,12 @@ struct Stood {
     pose: Rigid<Base, Flange>,
 }
 
-/// Where the flange was.
+/// The flange's poses over time.
 #[derive(Debug, Default)]
 pub struct Track(VecDeque<Stood>);
 
 impl Track {
-    /// A reading.
+    /// Adds a reading.
     pub fn add(&mut self, at_ns: u64, pose: Rigid<Base, Flange>) {
         match self.0.back_mut() {
             Some(last) if same(&last.pose, &pose) => last.to_ns = at_ns,
@@ -34,18 +34,18 @@ impl Track {
         }
     }
 
-    /// The newest reading, ns.
+    /// Time of the newest reading, ns.
     pub fn newest_ns(&self) -> Option<u64> {
         self.0.back().map(|s| s.to_ns)
     }
 
-    /// Where it stands, as it was read last.
+    /// The newest reading.
     pub fn newest(&self) -> Option<Rigid<Base, Flange>> {
         self.0.back().map(|s| s.pose)
     }
 
-    /// The readings before and after a moment; twice the same where the arm stood. `None`: nothing was read before or
-    /// after it.
+    /// The readings before and after a time; twice the same if the arm stood still. `None` if nothing was read
+    /// before or after it.
     pub fn about(&self, at_ns: u64) -> Option<[Rigid<Base, Flange>; 2]> {
         let after = self.0.partition_point(|s| s.to_ns < at_ns);
         let next = self.0.get(after)?;

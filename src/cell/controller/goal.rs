@@ -1,6 +1,7 @@
-//! In: pose data in all the forms that a controller takes. Out: a pose or joints; and poses in its own form.
-//! Frame and unit: mm and degrees as Denso writes them: P = X Y Z RX RY RZ Fig, T = X Y Z, orient, approach, Fig, J =
-//! joints.
+//! In: pose data in all the forms that a controller accepts. Out: a pose or joints; and poses in the controller's
+//! form.
+//! Frame and unit: mm and degrees as Denso writes them: P = X Y Z RX RY RZ Fig, T = X Y Z, orient, approach, Fig, J
+//! = joints.
 
 use super::super::kinematics::{Joints, figure};
 use super::{BAD_POSE, Outcome};
@@ -9,7 +10,7 @@ use crate::geometry::{Base, Flange, Mat3, Rigid, Vec3};
 use crate::robot::Convention;
 use std::collections::BTreeMap;
 
-/// Where a motion goes.
+/// Target of a motion.
 #[derive(Clone, Copy, Debug)]
 pub enum Goal {
     Pose(Rigid<Base, Flange>),
@@ -43,7 +44,7 @@ pub fn read(data: &Variant, variables: &BTreeMap<String, Variant>) -> Result<Goa
 
 fn from_text(text: &str, variables: &BTreeMap<String, Variant>) -> Result<Goal, Outcome> {
     let text = text.trim();
-    // The pass stands before the pose: @P, @E, @0, @100.
+    // The pass motion precedes the pose: @P, @E, @0, @100.
     let body = if text.starts_with('@') { text.split_once(' ').ok_or(BAD_POSE)?.1.trim() } else { text };
     if let Some((kind, rest)) = body.split_once('(') {
         let list = rest.strip_suffix(')').ok_or(BAD_POSE)?;
@@ -89,7 +90,7 @@ pub fn transform(pose: &Rigid<Base, Flange>, fig: i32) -> Vec<f64> {
     out
 }
 
-/// Joints as a controller writes them: eight, the last two 0.
+/// Joints as a controller writes them: eight numbers, the last two 0.
 pub fn joints(j: &Joints) -> Vec<f64> {
     j.iter().map(|a| a.to_degrees()).chain([0.0, 0.0]).collect()
 }

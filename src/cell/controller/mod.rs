@@ -1,5 +1,5 @@
-//! In: calls as they stand in b-CAP frames. Out: what the simulated controller answers, and what it makes the cell do.
-//! No sockets here: who serves a wire hands calls in and takes answers out.
+//! In: calls as decoded from b-CAP frames. Out: the simulated controller's answers, and its actions on the cell. No
+//! sockets here: the servers pass calls in and send the answers.
 //! Frame and unit: mm and degrees as Denso writes them; s of the cell.
 
 mod commands;
@@ -16,31 +16,31 @@ use panel::{Object, Panel};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The arm is taken by another client; this and the next are our own numbers in Denso's range.
+/// The arm is taken by another client. This code and those below are chosen by Sheetlight, in Denso's range.
 pub const TAKEN: Outcome = Outcome(0x8320_F001);
 /// The arm was not taken.
 pub const NOT_TAKEN: Outcome = Outcome(0x8320_F002);
 /// Out of reach.
 pub const OUT_OF_REACH: Outcome = Outcome(0x8320_F003);
-/// No pose.
+/// Not a pose.
 pub const BAD_POSE: Outcome = Outcome(0x8320_F004);
 /// Emergency stop.
 pub const EMERGENCY: Outcome = Outcome(0x8320_F005);
 /// Programs may not move the arm in this mode.
 pub const WRONG_MODE: Outcome = Outcome(0x8320_F006);
-/// In the virtual fence.
+/// The goal is in the virtual fence.
 pub const FENCE: Outcome = Outcome(0x8320_F007);
 
-/// What came of a call.
+/// Result of a call.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answer {
-    /// It is done: the outcome and what it returns.
+    /// The call is complete: the outcome and the returned value.
     Done(Outcome, Option<Variant>),
-    /// A motion was begun; [`Controller::motion`] says when it has ended.
+    /// A motion was begun; [`Controller::motion`] returns its outcome once it has ended.
     Moving(Ticket),
 }
 
-/// Refused, or done with a value.
+/// The returned value, or the outcome of a refusal.
 type Done = Result<Option<Variant>, Outcome>;
 
 /// The controller of a cell. Cheap to clone.
@@ -54,15 +54,15 @@ pub struct Controller {
 /// One client's connection.
 pub struct Connection {
     controller: Controller,
-    /// Its number in the log.
+    /// Number of the connection in the log.
     pub number: u64,
     started: bool,
-    /// Interim replies come at this distance, ms.
+    /// Interval of interim replies, ms.
     pub watchdog_ms: Option<u64>,
 }
 
 impl Controller {
-    /// The controller of a cell: automatic, motor off, no error.
+    /// The controller of a cell: automatic mode, motor off, no error.
     pub fn new(cell: Cell) -> Controller {
         Controller { cell, panel: Arc::new(Mutex::new(Panel::default())), connections: Arc::default() }
     }
@@ -77,19 +77,19 @@ impl Controller {
         self.panel.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The cell behind it.
+    /// The controller's cell.
     pub fn cell(&self) -> &Cell {
         &self.cell
     }
 }
 
 impl Connection {
-    /// The controller at the other end.
+    /// The controller of this connection.
     pub fn controller(&self) -> Controller {
         self.controller.clone()
     }
 
-    /// Answers a call. A call that has a result answers a failure with one empty value, others with none.
+    /// Answers a call. On failure, a call that has a result returns one empty value, others return none.
     pub fn answer(&mut self, number: u32, arguments: &[Variant]) -> Answer {
         let Some(call) = Call::of(number) else { return Answer::Done(Outcome::NOT_IMPLEMENTED, None) };
         if call == Call::RobotMove {
@@ -167,7 +167,7 @@ impl Connection {
         Ok(None)
     }
 
-    /// The lowest number that is free becomes the handle.
+    /// Assigns the lowest free number as the handle.
     fn grant(&mut self, object: Object) -> Done {
         let mut panel = self.controller.panel();
         let handle = (1..).find(|k| !panel.objects.contains_key(k)).expect("some number is free");
@@ -175,7 +175,7 @@ impl Connection {
         Ok(Some(Variant::I32(handle)))
     }
 
-    /// What the first argument stands for, on this connection.
+    /// The object that the first argument refers to, on this connection.
     fn object(&self, arguments: &[Variant]) -> Result<Object, Outcome> {
         let panel = self.controller.panel();
         let found = panel.objects.get(&key(arguments)).filter(|(owner, _)| *owner == self.number);

@@ -1,5 +1,5 @@
-//! In: a Move or a Halt. Out: a motion of the cell's arm, once; when and how it ended.
-//! Frame and unit: base_from_flange, mm; s of the cell; shares of the full speed.
+//! In: a Move or a Halt. Out: one motion of the cell's arm; when and with which outcome it ended.
+//! Frame and unit: base_from_flange, mm; s of the cell; fractions of the full speed.
 
 use super::goal::{Goal, read};
 use super::panel::AUTOMATIC;
@@ -13,18 +13,18 @@ use crate::geometry::{Base, Flange, Rigid};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ticket(u64);
 
-/// What a controller answers where a pose cannot be had.
+/// The controller's answer for a pose that cannot be reached.
 pub fn unreachable(why: Unreachable) -> Outcome {
     match why {
         Unreachable::TooFar => super::OUT_OF_REACH,
         Unreachable::Singular => super::OUT_OF_REACH,
-        // The first joint that is out.
+        // The first joint that is out of its limits.
         Unreachable::Limits(bits) => Outcome(0x8320_4071 + bits.trailing_zeros()),
     }
 }
 
 impl Controller {
-    /// Joints that lead to a goal from where the arm stands.
+    /// Joints that reach a goal from the arm's current joints.
     pub(super) fn solve(&self, goal: &Goal) -> Result<Joints, Unreachable> {
         let world = self.cell.world();
         match goal {
@@ -36,13 +36,13 @@ impl Controller {
         }
     }
 
-    /// Whether a flange pose is in the virtual fence.
+    /// Whether a flange pose lies in the virtual fence.
     pub(super) fn fenced(&self, pose: &Rigid<Base, Flange>) -> bool {
         let p = pose.translation;
         self.panel().fence.is_some_and(|[low, high]| (0..3).all(|k| p[k] >= low[k] && p[k] <= high[k]))
     }
 
-    /// Stops what moves; `why` is what its Move answers.
+    /// Stops the motion under way; its Move is answered with `why`.
     pub(super) fn halt(&self, connection: Option<u64>, why: Outcome) {
         self.settle();
         let mut panel = self.panel();
@@ -52,7 +52,7 @@ impl Controller {
         }
     }
 
-    /// Notes a motion that has ended.
+    /// Records the outcome of a motion that has ended.
     pub(super) fn settle(&self) {
         let mut panel = self.panel();
         let Some((number, stopped)) = panel.motion else { return };
@@ -65,7 +65,7 @@ impl Controller {
         }
     }
 
-    /// How a motion ended; `None` while it is under way.
+    /// Outcome of a motion; `None` while it is under way.
     pub fn motion(&self, ticket: Ticket) -> Option<Outcome> {
         self.settle();
         let mut panel = self.panel();
@@ -129,7 +129,7 @@ impl Connection {
     }
 }
 
-/// Motor, error, mode, arm: in the order in which a controller looks.
+/// Checks motor, errors, mode and arm in the order in which a controller checks them.
 fn may_move(panel: &super::Panel, connection: u64) -> Result<(), Outcome> {
     match () {
         () if panel.emergency => Err(super::EMERGENCY),
@@ -141,7 +141,7 @@ fn may_move(panel: &super::Panel, connection: u64) -> Result<(), Outcome> {
     }
 }
 
-/// The speeds that multiply: external, internal, the motion's own (`SPEED=50`, `SPEED=F2`).
+/// Product of the speeds: external, internal, and the motion's (`SPEED=50`, `SPEED=F2`).
 fn share(panel: &super::Panel, words: &str) -> Result<Share, Outcome> {
     let own = words.split(',').filter_map(|w| w.split_once('=')).find(|(k, _)| matches!(k.trim(), "SPEED" | "S"));
     let own = match own.map(|(_, v)| v.trim()) {

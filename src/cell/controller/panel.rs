@@ -1,28 +1,29 @@
-//! In: nothing. Out: what stands on the controller's panel: mode, motor, errors, speeds, variables, who has the arm.
+//! In: nothing. Out: the state of the controller's panel: mode, motor, errors, speeds, variables, which connection
+//! has the arm.
 //! Frame and unit: speeds in per cent.
 
 use crate::bcap::{Outcome, Variant};
 use crate::geometry::Vec3;
 use std::collections::BTreeMap;
 
-/// What @MODE says when programs may move the arm.
+/// Value of @MODE when programs may move the arm.
 pub const AUTOMATIC: i32 = 3;
 
-/// What a handle stands for.
+/// The object behind a handle.
 #[derive(Clone, Debug)]
 pub enum Object {
     Controller,
     Robot,
-    /// Its name.
+    /// The variable's name.
     Variable(String),
 }
 
-/// Everything on the panel.
+/// The whole state of the panel.
 pub struct Panel {
     pub mode: i32,
     pub motor: bool,
     pub emergency: bool,
-    /// Code and text, the newest first.
+    /// Code and text, newest first.
     pub errors: Vec<(u32, String)>,
     /// The connection that has the arm.
     pub taken: Option<u64>,
@@ -32,26 +33,26 @@ pub struct Panel {
     pub external: [f64; 3],
     /// Internal speed.
     pub internal: f64,
-    /// The figure that the arm says it has, where it is another than its joints'; and the one that the next motion
-    /// gives it.
+    /// `figure`: the reported figure, if it differs from that of the joints. `next_figure`: the figure that the
+    /// next motion sets.
     pub figure: Option<i32>,
     pub next_figure: Option<i32>,
     pub variables: BTreeMap<String, Variant>,
-    /// Corners of a box that nothing may enter, mm.
+    /// Corners of a box that the flange may not enter, mm.
     pub fence: Option<[Vec3; 2]>,
-    /// The motion that is under way, and how it was stopped.
+    /// The motion under way, and the outcome with which it was stopped, if it was.
     pub motion: Option<(u64, Option<Outcome>)>,
     pub motions: u64,
-    /// How motions ended, until they are asked for.
+    /// Outcomes of ended motions, until they are queried.
     pub ended: BTreeMap<u64, Outcome>,
     pub objects: BTreeMap<i32, (u64, Object)>,
     /// Error texts in Japanese.
     pub japanese: bool,
-    /// It does not say that it is a simulated one.
+    /// Does not report that it is simulated.
     pub as_real: bool,
-    /// What it stamps poses with, ms, from its own time.
+    /// Makes the time stamp of a pose, ms, from the cell's time.
     pub stamp: fn(f64) -> f64,
-    /// The poses that it tells stand still since then, s.
+    /// The reported poses stay as they were at this time, s.
     pub frozen: Option<f64>,
 }
 

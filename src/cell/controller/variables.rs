@@ -1,11 +1,11 @@
-//! In: names and values of variables. Out: the controller's, the robot's, its inputs and outputs.
+//! In: names and values of variables. Out: variables of the controller and the robot, inputs and outputs.
 //! Frame and unit: mm and degrees as Denso writes them.
 
 use super::{Connection, Done, Object, Outcome, goal};
 use crate::arm::SIMULATED;
 use crate::bcap::Variant;
 
-/// Kinds of variables that programs have, by their letters, the longer first.
+/// Kinds of program variables by their letters, longer ones first.
 const KINDS: [&str; 8] = ["IO", "I", "F", "D", "S", "P", "J", "T"];
 
 fn kind(name: &str) -> Option<&'static str> {
@@ -14,7 +14,7 @@ fn kind(name: &str) -> Option<&'static str> {
         .find(|k| name.strip_prefix(k).is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit())))
 }
 
-/// What a variable holds before anyone has written it.
+/// Initial value of a variable.
 fn fresh(kind: &str) -> Variant {
     match kind {
         "I" => Variant::I32(0),
@@ -28,7 +28,7 @@ fn fresh(kind: &str) -> Variant {
     }
 }
 
-/// Whether a variable of this kind takes a value, and as what.
+/// The value as a variable of this kind stores it; `None` if the kind does not accept it.
 fn fits(kind: &str, value: &Variant) -> Option<Variant> {
     let numbers = |n: usize| Some(value.as_f64s().filter(|v| v.len() <= n)?.into_iter().map(|x| x as f32).collect());
     match kind {
@@ -43,7 +43,7 @@ fn fits(kind: &str, value: &Variant) -> Option<Variant> {
     }
 }
 
-/// Names of the system's variables: of the robot, of the controller.
+/// Names of the system variables: of the robot, of the controller.
 const OF_ROBOT: [&str; 6] =
     ["@BUSY_STATUS", "@SERVO_ON", "@CURRENT_POSITION", "@CURRENT_ANGLE", "@TYPE_NAME", "@EXTSPEED"];
 const OF_CONTROLLER: [&str; 4] = ["@MODE", "@ERROR_CODE", "@EMERGENCY_STOP", SIMULATED[0]];

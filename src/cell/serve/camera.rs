@@ -1,5 +1,5 @@
-//! Answers the viewers of the cell's cameras and sends their pictures (`capture::wire` has the protocol). Times are in
-//! ns of the cell's clock.
+//! Answers the viewers of the cell's cameras and sends their pictures (`capture::wire` has the protocol). Times are
+//! in ns of the cell's clock.
 
 use super::Faults;
 use crate::capture::wire::{Message, Sent, write};
@@ -12,15 +12,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 const LOOK: Duration = Duration::from_millis(5);
-/// Pictures that can be asked for in a second.
+/// Frame rates that can be requested, Hz.
 const RATES_HZ: [f64; 2] = [0.01, 2000.0];
 
-/// What one client has asked for, and what it was sent.
+/// One client: its request, and the numbers of its pictures.
 struct Viewer {
     cell: Cell,
     in_gripper: bool,
     stream: Mutex<TcpStream>,
-    /// Pictures a second; none while it is stopped.
+    /// Frame rate, Hz; `None` while acquisition is stopped.
     rate: Mutex<Option<f64>>,
     taken: Mutex<[u64; 2]>,
 }
@@ -65,7 +65,7 @@ impl Viewer {
         self.stream.lock().unwrap_or_else(PoisonError::into_inner).write_all(&write(message))
     }
 
-    /// The picture of a moment, asked for one by one: time stands still while it is made.
+    /// Takes a single picture; the cell's time is held while it is rendered.
     fn snap(&self) -> std::io::Result<()> {
         let held = self.cell.clock().hold();
         let message = self.picture(self.cell.clock().now());
@@ -77,7 +77,7 @@ impl Viewer {
         self.cell.exposure(self.in_gripper).us()
     }
 
-    /// The picture of a moment that has come.
+    /// The picture of a past moment.
     fn picture(&self, t: f64) -> Message {
         let exposure_s = 1e-6 * self.exposure_us();
         let image = if self.in_gripper { self.cell.gripper_picture(t) } else { self.cell.picture(t) };
@@ -157,8 +157,9 @@ impl Viewer {
         }
     }
 
-    /// Takes pictures at the rate that was asked for, at even moments of the cell's time, which goes on meanwhile:
-    /// those whose moment has passed when the one before is made are taken and not sent, and their numbers are missing.
+    /// Takes pictures at the requested rate, at regular moments of the cell's time, which is not held. Pictures
+    /// whose moment passes while an earlier one is rendered count as taken but are not sent: their numbers are
+    /// missing.
     fn run(&self, over: &AtomicBool, faults: &Faults) {
         let mut next = None::<f64>;
         while !over.load(Ordering::Relaxed) && !Faults::on(&faults.camera_gone) {
@@ -168,7 +169,7 @@ impl Viewer {
                 std::thread::sleep(LOOK);
                 continue;
             };
-            // One exposure ends before the next begins.
+            // An exposure ends before the next one begins.
             let fps = asked.min(1e6 / self.exposure_us());
             let at = next.unwrap_or_else(|| self.cell.clock().now());
             if !self.cell.clock().wait(at, LOOK) {

@@ -1,33 +1,33 @@
-//! In: what a test or a person wants to go wrong. Out: the same, as the servers ask for it.
+//! In: faults that a test or a person switches on. Out: the same, as the servers query them.
 //! Frame and unit: ms, bytes, counts.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// What goes wrong on the wire; all off at first. May be changed at any time.
+/// Faults on the wire; all off at first. May be changed at any time.
 #[derive(Debug, Default)]
 pub struct Faults {
-    /// Each answer comes so much later, ms.
+    /// Delay of each answer, ms.
     pub delay_ms: AtomicU64,
-    /// Answers over TCP leave in pieces of so many bytes; 0: whole.
+    /// Answers over TCP are sent in pieces of this many bytes; 0: whole.
     pub piece: AtomicU64,
-    /// Answers over TCP wait until the next one leaves, and both leave together.
+    /// An answer over TCP waits for the next one, and both are sent together.
     pub merge: AtomicBool,
-    /// Before each answer comes one to a serial that nobody sent.
+    /// Before each answer, one with a serial that no client used is sent.
     pub foreign: AtomicBool,
-    /// Before each answer come so many interim replies.
+    /// Number of interim replies before each answer.
     pub interim: AtomicU64,
-    /// So many of the next answers are lost: made, remembered, not sent.
+    /// Number of next answers that are lost: computed, remembered, not sent.
     pub lose: AtomicU64,
-    /// So many of the next calls end their connection instead of an answer; what they ask for is done.
+    /// Number of next calls that close their connection instead of an answer; the calls are executed.
     pub cut: AtomicU64,
-    /// The controller is not there: connections are closed at once.
+    /// The controller is unreachable: connections are closed at once.
     pub gone: AtomicBool,
-    /// The camera is not there.
+    /// The camera is unreachable.
     pub camera_gone: AtomicBool,
 }
 
 impl Faults {
-    /// Takes one of a number of faults that is left.
+    /// Uses up one of the remaining faults; false if none is left.
     pub(super) fn take(of: &AtomicU64) -> bool {
         of.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |n| n.checked_sub(1)).is_ok()
     }
@@ -35,7 +35,7 @@ impl Faults {
     pub(super) fn on(of: &AtomicBool) -> bool {
         of.load(Ordering::Relaxed)
     }
-    /// Everything as it should be.
+    /// Switches all faults off.
     pub fn clear(&self) {
         for n in [&self.delay_ms, &self.piece, &self.interim, &self.lose, &self.cut] {
             n.store(0, Ordering::SeqCst);

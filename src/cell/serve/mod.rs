@@ -1,4 +1,5 @@
-//! In: a cell and addresses to listen on. Out: the cell on the wire: its controller on TCP and UDP, its camera on TCP.
+//! In: a cell and addresses to listen on. Out: the cell on the network: its controller on TCP and UDP, its cameras
+//! on TCP.
 //! Frame and unit: bytes.
 
 mod camera;
@@ -14,28 +15,28 @@ use std::net::{SocketAddr, TcpListener, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A cell that answers on sockets until it is dropped.
+/// A cell that is served on sockets until this is dropped.
 pub struct Served {
     /// The cell.
     pub cell: Cell,
-    /// Its controller.
+    /// The cell's controller.
     pub controller: Controller,
-    /// What goes wrong on the wire.
+    /// Faults on the wire.
     pub faults: Arc<Faults>,
-    /// Where the controller listens, TCP and UDP.
+    /// Address of the controller, TCP and UDP.
     pub robot: SocketAddr,
-    /// Where the camera listens.
+    /// Address of the camera.
     pub camera: SocketAddr,
-    /// Where the gripper's camera listens.
+    /// Address of the gripper's camera.
     pub gripper_camera: SocketAddr,
     over: Arc<AtomicBool>,
 }
 
 impl Served {
-    /// Serves a cell. Ports of 0 are chosen by the system.
+    /// Serves a cell. The system chooses a port if it is 0.
     ///
     /// # Errors
-    /// A port is taken, or no thread can be started.
+    /// A port is in use, or no thread can be started.
     pub fn start(cell: Cell, robot: &str, camera: &str, gripper_camera: &str) -> Result<Served> {
         let (listener, datagrams) = robot_sockets(robot)?;
         let cameras = [camera, gripper_camera].map(|at| TcpListener::bind(at).map_err(|e| taken(at, &e)));
@@ -66,10 +67,10 @@ impl Served {
         Ok(served)
     }
 
-    /// On ports of this machine that the system chooses.
+    /// Serves a cell on local ports that the system chooses.
     ///
     /// # Errors
-    /// As [`Served::start`].
+    /// As for [`Served::start`].
     pub fn here(cell: Cell) -> Result<Served> {
         Served::start(cell, "127.0.0.1:0", "127.0.0.1:0", "127.0.0.1:0")
     }
@@ -78,7 +79,7 @@ impl Served {
     pub fn robot_uri(&self) -> String {
         format!("bcap://{}", self.robot)
     }
-    /// The camera as a URI; pictures are taken one by one.
+    /// The camera as a URI; pictures are requested one by one.
     pub fn camera_uri(&self) -> String {
         format!("cell://{}?rate=-1", self.camera)
     }
@@ -90,10 +91,10 @@ impl Drop for Served {
     }
 }
 
-/// One port for both, TCP and UDP.
+/// The same port number for TCP and UDP.
 fn robot_sockets(at: &str) -> Result<(TcpListener, UdpSocket)> {
     let mut last = None;
-    // A port that the system chose for TCP may be taken for UDP: then another.
+    // A port that the system chose for TCP may be in use for UDP: then try another one.
     for _ in 0..20 {
         let listener = TcpListener::bind(at).map_err(|e| taken(at, &e))?;
         let address = listener.local_addr().map_err(|e| taken(at, &e))?;

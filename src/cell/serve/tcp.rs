@@ -1,4 +1,4 @@
-//! In: TCP clients of the controller. Out: their answers, each client on a thread of its own; a frame that cannot be
+//! In: TCP clients of the controller. Out: their answers, each client on a separate thread. A frame that cannot be
 //! read closes its connection without an answer, as Denso's service does.
 //! Frame and unit: bytes; ms.
 
@@ -11,11 +11,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// How often a server looks whether it is over, and whether a motion has ended.
+/// Interval at which a server checks whether it must end, and whether a motion has ended.
 const LOOK: Duration = Duration::from_millis(2);
-/// Clients at once, as Denso's service has them.
+/// Largest number of clients at once, as in Denso's service.
 const MOST_CLIENTS: usize = 20;
-/// After an incomplete frame the connection is forgotten.
+/// Longest wait for bytes; after it an answer that waits to be merged is sent alone.
 const PATIENCE: Duration = Duration::from_millis(100);
 
 pub(super) fn serve(listener: &TcpListener, controller: &Controller, faults: &Arc<Faults>, over: &Arc<AtomicBool>) {
@@ -40,7 +40,7 @@ pub(super) fn serve(listener: &TcpListener, controller: &Controller, faults: &Ar
     }
 }
 
-/// Serves one client until it goes or its bytes make no sense.
+/// Serves one client until it disconnects or sends bytes that cannot be read.
 fn client(
     mut stream: TcpStream,
     mut connection: Connection,
@@ -70,7 +70,7 @@ fn client(
             Ok(n) => splitter.push(&buffer[..n]),
             Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted) => {
                 if !kept.is_empty() {
-                    // Nothing follows that it could be merged with.
+                    // No later answer came with which it could be merged.
                     stream.write_all(&std::mem::take(&mut kept))?;
                 }
             }
@@ -80,7 +80,7 @@ fn client(
     Ok(())
 }
 
-/// Waits out what a call takes; interim replies go out meanwhile.
+/// Waits until a call is complete; sends interim replies meanwhile.
 pub(super) fn outcome(
     connection: &mut Connection,
     controller: &Controller,
@@ -129,7 +129,7 @@ fn answer(
     let controller = connection.controller();
     let mut lost = false;
     let reply = outcome(connection, &controller, frame, faults, over, |interim| {
-        // A client that has gone does not stop its motion.
+        // A client that disconnects does not stop its motion.
         lost |= stream.write_all(&bytes(&interim)).is_err();
         Ok(())
     })?;
@@ -143,7 +143,7 @@ fn answer(
     }
     out.extend(bytes(&reply));
     if waits {
-        // Until the next one leaves, or nothing has come for a while.
+        // Until the next answer is sent, or nothing has arrived for a while.
         *kept = out;
         return Ok(());
     }

@@ -1,5 +1,5 @@
 //! In: UDP clients of the controller. Out: their answers, one call after the other for all clients, as Denso's
-//! service does it; a repeated request is answered from memory and done once.
+//! service does. A repeated request is answered from memory and executed once.
 //! Frame and unit: bytes; ms.
 
 use super::Faults;
@@ -11,10 +11,10 @@ use std::net::{SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Clients that are remembered.
+/// Largest number of clients that are remembered.
 const MOST_CLIENTS: usize = 20;
 
-/// A client, the call that it made last, and what came of it.
+/// A client, with its last call and the answer to it.
 struct Client {
     connection: Connection,
     last: Option<(u16, Frame)>,
@@ -28,7 +28,7 @@ pub(super) fn serve(socket: &UdpSocket, controller: &Controller, faults: &Faults
     }
     while !over.load(Ordering::Relaxed) {
         let Ok((n, from)) = socket.recv_from(&mut buffer) else { continue };
-        // A datagram that makes no sense is passed over.
+        // A datagram that cannot be read is skipped.
         let Ok(frame) = Frame::decode(&buffer[..n]) else { continue };
         if Faults::on(&faults.gone) {
             continue;

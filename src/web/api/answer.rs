@@ -1,4 +1,4 @@
-//! In: what a procedure came to. Out: an HTTP answer; work that waits for the disk runs beside the server's own
+//! In: the result of a procedure. Out: an HTTP answer. Work that waits for the disk runs outside the server's
 //! threads.
 //! Frame and unit: none.
 
@@ -13,7 +13,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::sync::Arc;
 
-/// A fault with its status.
+/// A fault with its HTTP status.
 pub struct Refusal(pub StatusCode, pub Fault);
 
 impl From<Fault> for Refusal {
@@ -36,10 +36,10 @@ impl IntoResponse for Refusal {
     }
 }
 
-/// What handlers give back.
+/// Result of a handler.
 pub type Answer<T> = std::result::Result<T, Refusal>;
 
-/// Runs something that may wait for the disk or take long, and answers in JSON.
+/// Runs work that may wait for the disk or take long, and answers in JSON.
 pub async fn json<T: Serialize + Send + 'static>(
     screen: Arc<Screen>,
     work: impl FnOnce(&Screen) -> Result<T> + Send + 'static,
@@ -47,7 +47,7 @@ pub async fn json<T: Serialize + Send + 'static>(
     beside(screen, work).await.map(Json)
 }
 
-/// The same for an answer of its own kind.
+/// The same for an answer that is not JSON.
 pub async fn beside<T: Send + 'static>(
     screen: Arc<Screen>,
     work: impl FnOnce(&Screen) -> Result<T> + Send + 'static,
@@ -61,12 +61,12 @@ pub async fn beside<T: Send + 'static>(
     }
 }
 
-/// Does something that may take long after the answer, which does not wait for it.
+/// Runs work that may take long; the answer does not wait for it.
 pub fn afterwards(screen: Arc<Screen>, work: impl FnOnce(&Screen) + Send + 'static) {
     drop(tokio::task::spawn_blocking(move || work(&screen)));
 }
 
-/// Reads a body as JSON.
+/// Parses a body as JSON.
 pub fn body<T: DeserializeOwned>(bytes: &Bytes) -> Result<T> {
     serde_json::from_slice(bytes).map_err(|e| {
         Fault::usage(format!("the request cannot be read: {e}"))
@@ -75,7 +75,7 @@ pub fn body<T: DeserializeOwned>(bytes: &Bytes) -> Result<T> {
     })
 }
 
-/// Refuses a tab that does not operate.
+/// Returns an error for a tab that does not operate.
 pub fn operates(screen: &Screen, tab: &Tab) -> Answer<()> {
     screen.leases.need(tab).map_err(|fault| Refusal(StatusCode::FORBIDDEN, fault))
 }

@@ -1,5 +1,5 @@
-//! In: the number of the picture that a page shows. Out: the newest other one with its peaks, as soon as there is
-//! one; a part over it.
+//! In: the number of the picture that a page shows. Out: the newest other picture with its peaks, as soon as there
+//! is one; a part over it.
 //! Frame and unit: px, grey levels of 8 bits, ms; numbers little endian.
 
 use super::answer::{Answer, body, json, operates};
@@ -20,12 +20,12 @@ use serde::Deserialize;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Waited for a picture at most so long; the page asks again.
+/// Longest wait for a picture; the page asks again.
 pub(super) const LONGEST: Duration = Duration::from_secs(1);
-/// Looked for one this often.
+/// Polling interval of that wait.
 const OFTEN: Duration = Duration::from_millis(4);
 
-/// Which one the page has.
+/// The picture that the page has.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct After {
@@ -55,7 +55,7 @@ pub async fn set(
     json(screen, move |s| camera(s)?.set(&ask)).await
 }
 
-/// GET /camera/look: what the newest picture shows.
+/// GET /camera/look: measures of the newest picture.
 pub async fn look_now(State(screen): State<Arc<Screen>>) -> Answer<Json<PictureLook>> {
     json(screen, |s| {
         let newest = camera(s)?.other_than(0).ok_or_else(|| {
@@ -72,7 +72,7 @@ pub async fn look_back(State(screen): State<Arc<Screen>>, Query(ask): Query<Pict
 }
 
 /// GET /camera/newest?after=: number, columns, rows, number of peaks (u32), delay in ms (float), then u, v (float)
-/// and fate (u32) of each peak, then the grey levels; 204 where none came within a second.
+/// and fate (u32) of each peak, then the grey levels. 204 if no picture came within a second.
 pub async fn newest(State(screen): State<Arc<Screen>>, Query(ask): Query<After>) -> Answer<Response> {
     let camera = camera(&screen)?;
     Ok(match camera.next(ask.after, LONGEST).await {
@@ -81,7 +81,7 @@ pub async fn newest(State(screen): State<Arc<Screen>>, Query(ask): Query<After>)
     })
 }
 
-/// Over which picture.
+/// The picture over which the part is drawn.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Number {

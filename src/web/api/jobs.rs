@@ -1,4 +1,4 @@
-//! In: orders and questions about jobs. Out: jobs, and the files that they left.
+//! In: orders and questions about jobs. Out: jobs, and their files.
 //! Frame and unit: bytes.
 
 use super::answer::{Answer, afterwards, beside, body, json, operates};
@@ -44,7 +44,7 @@ pub async fn act(
     Extension(tab): Extension<Tab>,
     UrlPath((id, what)): UrlPath<(String, String)>,
 ) -> Answer<Json<Job>> {
-    // Everybody may stop, and it acts here, before the queue of work that waits for the disk.
+    // Every viewer may stop. This acts here, not in the queue of work that waits for the disk.
     if what == "stop" {
         let job = screen.jobs.stop(&id)?;
         afterwards(screen, move |s| s.jobs.keep(&[id]));
@@ -80,7 +80,7 @@ pub async fn remove(
     json(screen, move |s| s.jobs.remove(&id).map(|()| serde_json::json!({}))).await
 }
 
-/// Files of a job that may be had, with what they are.
+/// Types of a job's files that may be downloaded, with their media types.
 const KINDS: [(&str, &str); 8] = [
     ("png", "image/png"),
     ("ply", "application/octet-stream"),
@@ -89,11 +89,11 @@ const KINDS: [(&str, &str); 8] = [
     ("json", "application/json"),
     ("toml", "text/plain; charset=utf-8"),
     ("csv", "text/csv; charset=utf-8"),
-    // A report is shown as text: its scripts and styles are none of this page's.
+    // A report is shown as text, so that its scripts and styles do not run in this page.
     ("html", "text/plain; charset=utf-8"),
 ];
 
-/// Bytes of a file that is given out; a longer cloud is copied from the disk itself.
+/// Most bytes of a downloaded file; a larger cloud must be copied from the disk by hand.
 const MOST_FILE: u64 = 512 << 20;
 
 /// GET /jobs/{id}/files/{name}

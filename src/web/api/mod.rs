@@ -1,5 +1,5 @@
-//! In: requests under /api/v1. Out: their answers, JSON but for pictures, maps and points; faults with their four
-//! sentences.
+//! In: requests under /api/v1. Out: their answers in JSON, except for pictures, maps and points; faults with their
+//! four sentences.
 //! Frame and unit: as the messages.
 
 mod answer;

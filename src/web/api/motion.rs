@@ -1,5 +1,5 @@
-//! In: a robot to arm, a button that goes down over a motion that is shown, is held, is let go. Out: that motion,
-//! once; or why not.
+//! In: a robot to arm, a button that is pressed, held and released for a shown motion. Out: that motion, once; or
+//! an error.
 //! Frame and unit: motions by their hash.
 
 use super::answer::{Answer, afterwards, body, json, operates};
@@ -20,7 +20,7 @@ pub async fn state(State(screen): Shared) -> Json<MotionState> {
     Json(screen.desk.state())
 }
 
-/// POST /robot: arms it from this tab, or gives it back.
+/// POST /robot: arms the robot from this tab, or disarms it.
 pub async fn arm(State(screen): Shared, Extension(tab): Extension<Tab>, bytes: Bytes) -> Answer<Json<MotionState>> {
     operates(&screen, &tab)?;
     let ask: Arming = body(&bytes)?;
@@ -33,42 +33,43 @@ pub async fn looked(State(screen): Shared, Extension(tab): Extension<Tab>) -> An
     json(screen, |s| s.desk.looked()).await
 }
 
-/// POST /motion/press: the button goes down. Answers the name under which it can be redeemed once.
+/// POST /motion/press: the button is pressed. Answers the name under which the grant can be redeemed once.
 pub async fn press(State(screen): Shared, Extension(tab): Extension<Tab>, bytes: Bytes) -> Answer<Json<Grant>> {
     operates(&screen, &tab)?;
     let what: Confirmed = body(&bytes)?;
     json(screen, move |s| s.desk.press(&tab, &what).map(|grant| Grant { grant })).await
 }
 
-/// POST /motion/go: it was held long enough, and is held on.
+/// POST /motion/go: the button was held long enough, and is still held.
 pub async fn go(State(screen): Shared, Extension(tab): Extension<Tab>, bytes: Bytes) -> Answer<Json<Value>> {
     operates(&screen, &tab)?;
     let ask: Redeem = body(&bytes)?;
     json(screen, move |s| s.desk.go(&tab, &ask.grant, &ask.what).map(|()| object!({}))).await
 }
 
-/// POST /motion/refuse: no; the job ends.
+/// POST /motion/refuse: refuses the motion; the job ends.
 pub async fn refuse(State(screen): Shared, Extension(tab): Extension<Tab>, bytes: Bytes) -> Answer<Json<Value>> {
     operates(&screen, &tab)?;
     let what: Confirmed = body(&bytes)?;
     json(screen, move |s| s.desk.refuse(&what).map(|()| object!({}))).await
 }
 
-/// POST /motion/release: the button was let go. Needs no lease: who lost it lets go too.
+/// POST /motion/release: the button was released. Needs no lease: a tab that lost it must be able to release too.
 pub async fn release(State(screen): Shared, Extension(tab): Extension<Tab>) -> Answer<Json<Value>> {
-    // Here, not in the queue of work that waits for the disk: a hand that opens halts the arm at once.
+    // Done here, not in the queue of work that waits for the disk, so that releasing the button halts the arm at
+    // once.
     screen.desk.let_go(&tab, "the button was let go");
     Ok(Json(object!({})))
 }
 
-/// POST /stop: everybody may. It acts here: every thread for work that takes long may be busy with pictures.
+/// POST /stop: every viewer may stop. It acts here, because every worker thread may be busy with pictures.
 pub async fn stop(State(screen): Shared) -> Json<Value> {
     let stopped = screen.jobs.stop_all();
     afterwards(screen, move |s| s.jobs.keep(&stopped));
     Json(object!({}))
 }
 
-/// POST /simulated: what a person does in the simulated cell.
+/// POST /simulated: a person's action in the simulated cell.
 pub async fn simulated(
     State(screen): Shared,
     Extension(tab): Extension<Tab>,

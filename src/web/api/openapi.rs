@@ -1,11 +1,11 @@
-//! In: the table of routes, the messages' declarations. Out: their description in OpenAPI 3.1; docs/openapi.json is
-//! this.
+//! In: the table of routes, the messages' declarations. Out: their description in OpenAPI 3.1, stored as
+//! docs/openapi.json.
 //! Frame and unit: none.
 
 use super::routes::{ROOT, Route, routes};
 use serde_json::{Map, Value, json};
 
-/// The description. Messages are named by `x-message`: docs/messages.d.ts declares each.
+/// The OpenAPI description. It names messages by `x-message`; docs/messages.d.ts declares them.
 pub fn openapi() -> Value {
     let mut paths: Map<String, Value> = Map::new();
     for r in routes() {

@@ -20,9 +20,9 @@ use axum::{Extension, Json};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Folders below the recordings' root that are looked into.
+/// Depth to which folders below the recordings' root are searched.
 const DEEPEST: usize = 3;
-/// Recordings that are listed.
+/// Most recordings that are listed.
 const MOST: usize = 500;
 
 /// GET /station
@@ -54,10 +54,10 @@ fn list(folder: &Path, name: &str, depth: usize, out: &mut Vec<RecordingInfo>) -
     let entries = std::fs::read_dir(folder).map_err(|e| Fault::read(folder, e))?;
     for entry in entries.flatten().filter(|_| depth > 0) {
         let word = entry.file_name().to_string_lossy().into_owned();
-        // Links are not followed: they may lead anywhere, or in a circle.
+        // Links are not followed: they may lead outside or form a cycle.
         if crate::web::guard::plain(&word) && entry.file_type().is_ok_and(|t| t.is_dir()) && out.len() < MOST {
             let below = if name.is_empty() { word } else { format!("{name}/{word}") };
-            // A folder that cannot be read hides itself alone.
+            // A folder that cannot be read is skipped; the others are listed.
             let _ = list(&entry.path(), &below, depth - 1, out);
         }
     }
@@ -96,7 +96,7 @@ fn info(folder: &Path, name: &str) -> RecordingInfo {
     }
 }
 
-/// A picture of a recording, as it was taken.
+/// A picture of a recording, at its original depth.
 pub(super) fn recorded(screen: &Screen, ask: &PictureRef) -> Result<Image> {
     let recording = Recording::open(&resolve(&screen.place.recordings, &ask.recording)?)?;
     let frame = recording.meta.frames.get(ask.frame).ok_or_else(|| {
@@ -124,7 +124,8 @@ pub async fn view(State(screen): State<Arc<Screen>>, Query(ask): Query<ViewRef>)
     json(screen, move |s| s.views.of_recording(&s.place, &ask.recording, ask.frame)).await
 }
 
-/// 8 bits, each pixel the brightest of those that it stands for: a stripe is thinner than a thumbnail's pixel.
+/// An 8-bit thumbnail. Each pixel is the brightest of those that it covers, because a stripe is thinner than a
+/// thumbnail's pixel.
 fn smaller(image: &Image, width: Option<u32>) -> Image {
     let by = width.map_or(1, |w| image.width.div_ceil(w.clamp(16, 4096))).max(1);
     let (w, h) = (image.width.div_ceil(by), image.height.div_ceil(by));
@@ -172,13 +173,13 @@ pub async fn drawing(
     json(screen, move |s| work::from_drawing(&s.place, &ask)).await
 }
 
-/// POST /points: of a recipe that need not be stored.
+/// POST /points: of a recipe text that need not be stored.
 pub async fn points(State(screen): State<Arc<Screen>>, bytes: Bytes) -> Answer<Json<Vec<RecipePoint>>> {
     let ask: PointsOf = body(&bytes)?;
     json(screen, move |_| work::points(&ask.text)).await
 }
 
-/// POST /points/change: of a recipe that need not be stored.
+/// POST /points/change: of a recipe text that need not be stored.
 pub async fn change_points(State(screen): State<Arc<Screen>>, bytes: Bytes) -> Answer<Json<PointsChanged>> {
     let ask: PointsChange = body(&bytes)?;
     json(screen, move |_| work::change_points(&ask)).await

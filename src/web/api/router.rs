@@ -1,4 +1,5 @@
-//! In: what all requests share. Out: the server: the API by its table, its own description, the pages.
+//! In: the state that all requests share. Out: the server: the API from its table of routes, its description, the
+//! pages.
 //! Frame and unit: none.
 
 use super::openapi::openapi;

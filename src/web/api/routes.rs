@@ -1,4 +1,4 @@
-//! In: nothing. Out: every route of the API, in one table: the server, its description and the tests read it.
+//! In: nothing. Out: every route of the API in one table, which the server, the description and the tests read.
 //! Frame and unit: none.
 
 use super::{camera, jobs, metrics, motion, place, session, settings, support, surface, sweep};
@@ -6,22 +6,22 @@ use crate::web::screen::Screen;
 use axum::routing::{MethodRouter, delete, get, post, put};
 use std::sync::Arc;
 
-/// Before every path of the table.
+/// Prefix of every path in the table.
 pub const ROOT: &str = "/api/v1";
 
 /// A route.
 pub struct Route {
     /// GET, POST, PUT or DELETE.
     pub method: &'static str,
-    /// Below [`ROOT`].
+    /// Path below [`ROOT`].
     pub path: &'static str,
-    /// One sentence.
+    /// What the route does, in one sentence.
     pub does: &'static str,
-    /// Name of the message in the body; empty: none.
+    /// Name of the message in the body; empty if there is none.
     pub takes: &'static str,
-    /// Name of the message in the answer, `[]` behind it for a list; a media type where it is no JSON.
+    /// Name of the message in the answer, followed by `[]` for a list; a media type if the answer is not JSON.
     pub gives: &'static str,
-    /// Only the tab that operates.
+    /// True: only the tab that operates may call it.
     pub lease: bool,
     pub(super) handler: MethodRouter<Arc<Screen>>,
 }
@@ -43,7 +43,7 @@ impl Route {
 
 const BYTES: &str = "application/octet-stream";
 
-/// All of them.
+/// All routes.
 pub fn routes() -> Vec<Route> {
     let subjects = [
         of_door(),
@@ -59,7 +59,7 @@ pub fn routes() -> Vec<Route> {
     subjects.into_iter().flatten().collect()
 }
 
-/// Who may come in, and which tab operates; what viewers are told.
+/// Sessions, the lease, and the events for viewers.
 fn of_door() -> Vec<Route> {
     vec![
         route(
@@ -85,7 +85,7 @@ fn of_door() -> Vec<Route> {
     ]
 }
 
-/// The station itself: settings, backups, boards, and what somebody who helps asks for.
+/// The station: settings, backups, boards, and the support file.
 fn of_station() -> Vec<Route> {
     vec![
         route(("GET", "/station"), "Settings and calibrations", ("", "StationInfo"), get(place::station)),
@@ -153,7 +153,7 @@ fn of_pictures() -> Vec<Route> {
     ]
 }
 
-/// The camera as it runs.
+/// The running camera.
 fn of_camera() -> Vec<Route> {
     vec![
         route(("GET", "/camera"), "What the camera can be set to", ("", "CameraState"), get(camera::state)),
@@ -179,7 +179,7 @@ fn of_camera() -> Vec<Route> {
     ]
 }
 
-/// What is looked for, and how the line would go over it.
+/// Recipes, and the planned sweep of the line over a part.
 fn of_recipes() -> Vec<Route> {
     vec![
         route(
@@ -230,7 +230,7 @@ fn of_recipes() -> Vec<Route> {
     ]
 }
 
-/// Jobs and what they left.
+/// Jobs and their files.
 fn of_jobs() -> Vec<Route> {
     vec![
         route(("GET", "/jobs"), "Jobs, newest first", ("", "Job[]"), get(jobs::list)),
@@ -272,7 +272,7 @@ fn of_jobs() -> Vec<Route> {
     ]
 }
 
-/// A scan, looked at and measured in.
+/// Viewing a scan and measuring in it.
 fn of_scans() -> Vec<Route> {
     vec![
         route(
@@ -316,7 +316,7 @@ fn of_scans() -> Vec<Route> {
     ]
 }
 
-/// The robot, real or simulated: how it stands and who may move it.
+/// The robot, real or simulated: its state and who may move it.
 fn of_robot() -> Vec<Route> {
     vec![
         route(("GET", "/motion"), "The robot as it may be moved from here", ("", "MotionState"), get(motion::state)),
@@ -351,7 +351,7 @@ fn of_robot() -> Vec<Route> {
     ]
 }
 
-/// One motion, from the button that goes down to the halt.
+/// One motion, from the pressed button to the halt.
 fn of_motion() -> Vec<Route> {
     vec![
         route(

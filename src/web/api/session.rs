@@ -1,4 +1,5 @@
-//! In: the token of this start or a password; tabs that want to operate. Out: a session's cookie; the lease.
+//! In: the token of this program start, or a password; tabs that want to operate. Out: a session's cookie; the
+//! lease.
 //! Frame and unit: seconds.
 
 use super::answer::{Answer, Refusal, afterwards, body, operates};
@@ -51,12 +52,12 @@ fn too_many(after: Duration) -> Response {
     ([(header::RETRY_AFTER, seconds.to_string())], Refusal(StatusCode::TOO_MANY_REQUESTS, fault)).into_response()
 }
 
-/// GET /session: whether there is one, and whether a password opens one.
+/// GET /session: the tab's name in the session.
 pub async fn state(State(_): State<Arc<Screen>>, Extension(tab): Extension<Tab>) -> Json<Session> {
     Json(Session { tab: tab.short() })
 }
 
-/// POST /lease: operate from this tab, or go on doing so.
+/// POST /lease: takes or renews the lease for this tab.
 pub async fn take(
     State(screen): State<Arc<Screen>>,
     Extension(tab): Extension<Tab>,
@@ -68,7 +69,8 @@ pub async fn take(
             .next("send the header X-Sheetlight-Tab with a name of your own")
             .into());
     }
-    // Here, as STOP: what the former operator moves halts at once. The bar looks at the disk and comes afterwards.
+    // Handled here, as STOP is: a motion of the previous operator halts at once. The bar reads the disk and is sent
+    // afterwards.
     let other = screen.leases.take(&tab, ask.firmly)?;
     let lease = screen.leases.state();
     if other {
@@ -78,7 +80,7 @@ pub async fn take(
     Ok(Json(lease))
 }
 
-/// POST /lease/release: let go.
+/// POST /lease/release: releases the lease.
 pub async fn release(State(screen): State<Arc<Screen>>, Extension(tab): Extension<Tab>) -> Answer<Json<Lease>> {
     operates(&screen, &tab)?;
     screen.desk.let_go(&tab, "the operator let another screen operate");
@@ -92,15 +94,15 @@ fn tell_bar(screen: &Screen) {
     screen.hub.tell(&Event::Bar(screen.bar()));
 }
 
-/// Which tab looks on.
+/// The tab that watches.
 #[derive(serde::Deserialize)]
 pub struct Who {
     #[serde(default)]
     tab: String,
 }
 
-/// GET /events: the WebSocket. A tab that holds the button says `held GRANT` over it; its end halts what that tab
-/// moves.
+/// GET /events: the WebSocket. A tab that holds the button sends `held GRANT` over it; when the socket closes, a
+/// motion of that tab is halted.
 pub async fn events(
     State(screen): State<Arc<Screen>>,
     Extension(asks): Extension<Tab>,
@@ -112,7 +114,7 @@ pub async fn events(
         return Err(Refusal(StatusCode::SERVICE_UNAVAILABLE, fault));
     };
     let hub = screen.hub.clone();
-    // What viewers send is short.
+    // Messages from viewers are short.
     let upgrade = upgrade.max_message_size(1024).max_write_buffer_size(8 << 20);
     let name: String = who.tab.chars().filter(char::is_ascii_alphanumeric).take(32).collect();
     let tab = if name.is_empty() { asks } else { Tab { tab: name, ..asks } };
@@ -120,7 +122,7 @@ pub async fn events(
         let (told, here, who) = (screen.clone(), screen.clone(), tab.clone());
         let hears = move |text: &str| {
             let Some(("held", grant)) = text.split_once(' ') else { return };
-            // Who holds the button operates.
+            // Only the operator may hold the button.
             if here.desk.held(&who, grant) && here.leases.need(&who).is_err() {
                 here.desk.let_go(&who, "the operator's lease was lost");
             }

@@ -1,5 +1,4 @@
-//! In: questions about the station's settings, changes of them, backups, outputs to try. Out: the settings as they
-//! stand then.
+//! In: questions about the station's settings, changes, backups, outputs to try. Out: the settings after that.
 //! Frame and unit: as the settings.
 
 use super::answer::{Answer, beside, body, json, operates};

@@ -1,5 +1,5 @@
-//! In: the station, its jobs, this machine. Out: a file for somebody who helps: logs and settings; pictures only
-//! where somebody ticked that.
+//! In: the station, its jobs, this machine. Out: a support file: logs and settings; pictures only if a person
+//! ticked the option.
 //! Frame and unit: px; base64 of PNG.
 
 use super::answer::{Answer, beside};
@@ -13,13 +13,13 @@ use axum::response::IntoResponse;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Newest pictures of jobs, and the largest of them, bytes.
+/// Most job pictures in the file; `LARGEST` is the largest size of each, bytes.
 const MOST: usize = 6;
 const LARGEST: u64 = 4 << 20;
-/// Pictures that jobs leave.
+/// Pictures that jobs store.
 const NAMES: [&str; 3] = ["found.png", "scan/height_picture.png", "scan/intensity_picture.png"];
 
-/// GET /support?pictures=: no secrets; no pictures unless they are asked for.
+/// GET /support?pictures=: contains no secrets; contains pictures only on request.
 pub async fn support(State(screen): State<Arc<Screen>>, Query(ask): Query<SupportAsk>) -> Answer<impl IntoResponse> {
     let text = beside(screen, move |s| {
         let mut report = serde_json::json!({
@@ -41,7 +41,7 @@ pub async fn support(State(screen): State<Arc<Screen>>, Query(ask): Query<Suppor
     Ok(([(header::CONTENT_TYPE, "application/json"), (header::CONTENT_DISPOSITION, name)], text))
 }
 
-/// The camera's newest picture and those that the newest jobs left, by name.
+/// The camera's newest picture and those of the newest jobs, by name.
 fn pictures(screen: &Screen) -> BTreeMap<String, String> {
     let encode = crate::station::base64;
     let mut all = BTreeMap::new();

@@ -1,5 +1,5 @@
-//! In: questions about a finished scan's surface. Out: its map's layers, sections, measures, points to look at.
-//! Frame and unit: grid frame, points in the cloud's; mm. Numbers of layers and points are little-endian floats.
+//! In: questions about a finished scan's surface. Out: its map's layers, sections, measurements, points to view.
+//! Frame and unit: grid frame, points in the cloud's frame; mm. Layers and points are sent as little-endian floats.
 
 use super::answer::{Answer, beside, body, json, operates};
 use crate::fault::{Fault, Result};
@@ -53,7 +53,7 @@ pub async fn filter(
     json(screen, move |s| s.maps.set(&s.scan(&id)?, ask)).await
 }
 
-/// Between which 99 % of the finite values lie.
+/// The range that contains 99 % of the finite values.
 fn span(values: &[f32]) -> [f64; 2] {
     let mut finite: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
     let Some(last) = finite.len().checked_sub(1) else { return [0.0, 1.0] };
@@ -104,7 +104,7 @@ pub async fn measured(
     json(screen, move |s| measure(&s.look(&id)?.map, &what)).await
 }
 
-/// Points of a view.
+/// Number of points of a view.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Most {
@@ -119,8 +119,8 @@ fn usual() -> usize {
 /// Most points that are sent: 40 MB.
 const MOST_POINTS: usize = 2_000_000;
 
-/// GET /scans/{id}/points?most=: points in the cloud and sent (u32 each), origin (3 doubles), then x y z sigma_mm
-/// intensity of each as floats; every share from the start on covers the whole scan.
+/// GET /scans/{id}/points?most=: number of points in the cloud and of those sent (u32 each), origin (3 doubles),
+/// then x y z sigma_mm intensity of each point as floats. Any leading fraction of the points covers the whole scan.
 pub async fn points(
     State(screen): Shared,
     UrlPath(id): UrlPath<String>,

@@ -1,5 +1,4 @@
-//! In: questions about a sweep that was not made yet, and about places that were found again and again. Out: the
-//! plan, the repeats.
+//! In: questions about a planned sweep, and about repeated poses of a part. Out: the plan; the repeatability.
 //! Frame and unit: mm, degrees.
 
 use super::answer::{Answer, body, json};
@@ -17,7 +16,7 @@ pub async fn planned(State(screen): State<Arc<Screen>>, Query(ask): Query<SweepA
     json(screen, move |s| sweep(s, &ask)).await
 }
 
-/// POST /repeats: of jobs that found a part.
+/// POST /repeats: repeatability of jobs that found a part.
 pub async fn repeated(State(screen): State<Arc<Screen>>, bytes: Bytes) -> Answer<Json<Repeats>> {
     let ask: RepeatsAsk = body(&bytes)?;
     json(screen, move |s| {

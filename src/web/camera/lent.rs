@@ -1,5 +1,5 @@
-//! In: an opened camera, a job. Out: that camera for the job; its pictures are shown, what it is set to is kept, and
-//! it is given back.
+//! In: an opened camera, a job. Out: that camera for the job. Its pictures are shown to viewers, its changed
+//! settings are stored, and it is returned afterwards.
 //! Frame and unit: as its pictures and features.
 
 use super::state::{Looked, State, Use, lock};
@@ -10,16 +10,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// A camera that a job has.
+/// A camera that a job uses.
 pub(super) struct Lent {
-    /// None until it is open.
+    /// `None` until it is open.
     pub inner: Option<Box<dyn PictureSource>>,
-    /// Who looks on sees what it takes.
+    /// State through which viewers see the pictures that the job takes.
     pub state: Arc<Mutex<State>>,
     pub use_: Arc<Use>,
     /// Ends the job.
     pub stop: Arc<AtomicBool>,
-    /// It was set to something.
+    /// A setting was changed.
     pub set: bool,
 }
 

@@ -1,4 +1,4 @@
-//! In: a camera's URI. Out: what it shows now, what it can be set to, the camera itself for a job.
+//! In: a camera's URI. Out: its newest picture, its settings, the camera itself for a job.
 //! Frame and unit: px of the picture, grey levels, ms; features by their standard names.
 
 mod lent;

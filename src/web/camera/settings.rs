@@ -1,4 +1,4 @@
-//! In: a camera that is looked at, a setting. Out: what it can be set to and is; the setting made.
+//! In: a camera that is being watched, a setting. Out: its settings and their values; the changed setting.
 //! Frame and unit: features by their standard names (SFNC).
 
 use super::state::lock;
@@ -8,16 +8,16 @@ use crate::web::message::{CameraFeature, CameraState, SetFeature};
 use std::sync::Arc;
 
 impl Camera {
-    /// What it can be set to, as it said last; nothing while it is not there.
+    /// The camera's settings, as it last reported them; empty while it is not connected.
     pub fn features(&self) -> CameraState {
         let features = lock(&self.state).features.iter().flatten().map(CameraFeature::from).collect();
         CameraState { features }
     }
 
-    /// Sets it; who looks on waits for a moment.
+    /// Changes a setting; viewers wait for a moment.
     ///
     /// # Errors
-    /// The camera refuses, is not there, or a job has it.
+    /// The camera refuses, is not connected, or a job uses it.
     pub fn set(&self, ask: &SetFeature) -> Result<CameraState> {
         self.lend_running(&Arc::default())?.set(&ask.name, &ask.value)?;
         Ok(self.features())

@@ -1,4 +1,4 @@
-//! In: pictures, settings, who has the camera. Out: the same, shared by who looks and who borrows.
+//! In: pictures, settings, the camera's user. Out: the same, shared by viewers and jobs.
 //! Frame and unit: px, grey levels, ms; ns of the host's clock.
 
 use crate::camera::Readout;
@@ -10,20 +10,20 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 use tokio::sync::Notify;
 
-/// Pictures whose moments are known: pages show one that is at most so many old.
+/// Number of newest pictures whose times are stored; a page shows none that is older.
 const MOMENTS: usize = 64;
 
-/// A picture to look at.
+/// A picture to show.
 pub struct Looked {
-    /// Counts up with every picture that was measured.
+    /// Increases with every picture that was measured.
     pub number: u64,
-    /// As it came.
+    /// The picture as received.
     pub image: Image,
-    /// u, v and fate (0: kept) of each peak.
+    /// u, v and `fate` (0: kept) of each peak.
     pub peaks: Vec<(f32, f32, u32)>,
-    /// From its last byte to its points, ms.
+    /// Time from its last byte to its points, ms.
     pub delay_ms: f32,
-    /// When its last byte came, ns of the host's clock.
+    /// Time at which its last byte arrived, ns of the host's clock.
     pub came_ns: u64,
     bytes: OnceLock<Bytes>,
 }
@@ -35,7 +35,7 @@ impl Looked {
     }
 
     /// Number, columns, rows, number of peaks (u32), delay in ms (float), then u, v (float) and fate (u32) of each
-    /// peak, then the grey levels; written once for all who look.
+    /// peak, then the grey levels. Serialized once for all viewers.
     pub fn bytes(&self) -> Bytes {
         self.bytes.get_or_init(|| self.written().into()).clone()
     }
@@ -58,20 +58,21 @@ impl Looked {
 #[derive(Default)]
 pub(super) struct State {
     pub newest: Option<Arc<Looked>>,
-    /// How the camera reads its pictures from the sensor, where it says so.
+    /// How the camera reads its pictures from the sensor, if it reports it.
     pub readout: Option<Readout>,
-    /// What the camera can be set to, as it said last.
+    /// The camera's settings, as it last reported them.
     pub features: Option<Vec<Feature>>,
-    /// What was set from here, in that order: a camera that forgets it is told again when it is opened.
+    /// Settings changed here, in order. They are set again when the camera is reopened, because it may have lost
+    /// them.
     pub kept: Vec<(String, String)>,
-    /// When the newest pictures' last bytes came, ns of the host's clock.
+    /// Number and arrival time of the newest pictures, ns of the host's clock.
     pub moments: VecDeque<(u64, u64)>,
     pub account: Account,
-    /// Pictures a second, as they came lately.
+    /// Recent frame rate, Hz.
     pub rate_hz: Option<f64>,
     pub measured: u64,
     pub without_stripe: u64,
-    /// Came while a job ran and nobody looked.
+    /// Pictures that arrived during a job while no viewer asked.
     pub unlooked: u64,
     pub delays: VecDeque<f64>,
     pub wrong: Option<String>,
@@ -91,18 +92,18 @@ impl State {
     }
 }
 
-/// Who has the camera.
+/// The use of the camera.
 #[derive(Default)]
 pub(super) struct Use {
     /// A job wants it, or has it.
     pub lent: AtomicBool,
-    /// It is looked at: its connection is open.
+    /// It is being watched: its connection is open.
     pub open: AtomicBool,
-    /// Settings or calibrations of the station are other ones.
+    /// The station's settings or calibrations have changed.
     pub renewed: AtomicBool,
-    /// A job runs: it comes first.
+    /// A job runs and has priority.
     pub busy: AtomicBool,
-    /// When somebody asked for a picture last, ns of the host's clock; 0: nobody did since the last one was measured.
+    /// Time of the last request for a picture, ns of the host's clock; 0: none since the last one was measured.
     pub asked_ns: AtomicU64,
     /// A picture was measured.
     pub came: Notify,

@@ -1,6 +1,6 @@
-//! In: a camera's URI, the station's rig. Out: the newest picture with its peaks by fate, and how long that took;
-//! pictures that came meanwhile are passed over and counted. A job that moves the robot borrows the camera: its
-//! pictures are shown then.
+//! In: a camera's URI, the station's rig. Out: the newest picture with its peaks by `fate`, and the time that took.
+//! Pictures that arrive meanwhile are skipped and counted. A job that moves the robot borrows the camera; its
+//! pictures are then shown.
 //! Frame and unit: px of the picture, grey levels of 8 bits, ms.
 
 use super::lent::Lent;
@@ -19,18 +19,18 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// Waited for a picture at most so long before is looked whether to end.
+/// Longest wait for a picture before checking whether to end.
 const WITHIN: Duration = Duration::from_millis(200);
-/// A camera that is not there is looked for again after so long.
+/// Interval at which a missing camera is opened again.
 const AGAIN: Duration = Duration::from_secs(1);
-/// A camera is given up by who looks at it within this.
+/// Time within which the watching thread releases the camera to a job.
 const GIVEN_UP: Duration = Duration::from_secs(5);
-/// While a job runs a picture that somebody asks for came no longer before that, ns.
+/// While a job runs: largest age of a picture, at the time of the request, at which it counts as fresh, ns.
 pub const FRESH: u64 = 50_000_000;
-/// Delays that p50 and p99 are of.
+/// Number of delays from which p50 and p99 are computed.
 const DELAYS: usize = 512;
 
-/// A camera that is looked at.
+/// A camera that is being watched.
 pub struct Camera {
     uri: CameraUri,
     pub(super) state: Arc<Mutex<State>>,
@@ -39,8 +39,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Begins to look; the camera need not be there yet. `raw` states what frames on standard input are like. Errors:
-    /// a URI that names no camera, no threads.
+    /// Starts watching; the camera need not be connected yet. `raw` states the format of frames on standard input.
+    /// Returns an error if the URI names no camera, or no thread can be started.
     pub fn watch(uri: &str, raw: Option<RawFormat>, station: &Path) -> Result<Camera> {
         let parsed: CameraUri =
             uri.parse().map_err(|e: String| Fault::usage(e).next("name a camera as docs/live.md shows"))?;
@@ -64,7 +64,7 @@ impl Camera {
                 lock(&tell).wrong =
                     Some(why.map_or_else(|fault| fault.what, |()| "the camera's pictures have ended".into()));
                 if parsed == CameraUri::Input {
-                    // What was read from a pipe cannot be had again.
+                    // What was read from a pipe cannot be read again.
                     return;
                 }
                 std::thread::sleep(AGAIN);
@@ -74,11 +74,11 @@ impl Camera {
         Ok(Camera { uri, state, ended, use_ })
     }
 
-    /// The camera for a job that asks for each picture, until what is given back is dropped; nobody else looks
-    /// through it meanwhile, what it takes is shown.
+    /// The camera for a job that requests each picture, until the returned value is dropped. Nobody else reads from
+    /// it meanwhile; its pictures are shown.
     ///
     /// # Errors
-    /// It is not there, is lent already, or is a pipe.
+    /// The camera is not connected, is lent already, or is a pipe.
     pub fn lend(&self) -> Result<Box<dyn PictureSource>> {
         let uri = match self.uri.clone() {
             CameraUri::Cell { address, .. } => CameraUri::Cell { address, rate_hz: -1.0 },
@@ -87,10 +87,10 @@ impl Camera {
         Ok(Box::new(self.borrowed(&uri, Arc::default())?))
     }
 
-    /// The camera at its own pace, to be set; it is lost to who has it once `stop` is set.
+    /// The camera at its own frame rate, to change its settings; the user loses it once `stop` is set.
     ///
     /// # Errors
-    /// Those of [`Camera::lend`].
+    /// As for [`Camera::lend`].
     pub fn lend_running(&self, stop: &Arc<AtomicBool>) -> Result<Box<dyn PictureSource>> {
         Ok(Box::new(self.borrowed(&self.uri, stop.clone())?))
     }
@@ -103,7 +103,7 @@ impl Camera {
         if self.use_.lent.swap(true, Ordering::SeqCst) {
             return Err(Fault::refused("another job has the camera").next("wait until it has ended"));
         }
-        // Whatever fails from here on gives it back.
+        // Any error from here on returns the camera.
         let mut lent = Lent { inner: None, state: self.state.clone(), use_: self.use_.clone(), stop, set: false };
         let give_up = Instant::now() + GIVEN_UP;
         while self.use_.open.load(Ordering::SeqCst) && Instant::now() < give_up {
@@ -113,26 +113,26 @@ impl Camera {
         Ok(lent)
     }
 
-    /// The station's settings or calibrations are other ones: the next picture is measured by them.
+    /// The station's settings or calibrations have changed: the next picture is measured with the new ones.
     pub fn renew(&self) {
         self.use_.renewed.store(true, Ordering::SeqCst);
     }
 
-    /// A job runs: pictures are measured where somebody looks alone, and on a thread of their own, so that the job
-    /// has all others.
+    /// A job runs: pictures are measured only on a viewer's request, and on a separate thread, so that the job has
+    /// all others.
     pub fn make_way(&self, busy: bool) {
         self.use_.busy.store(busy, Ordering::SeqCst);
     }
 
-    /// The next picture other than the one of this number, waited for at most so long; while a job runs one that is
-    /// fresh, where one comes.
+    /// The next picture whose number is not `number`, within the time limit. While a job runs it waits for a fresh
+    /// one, and returns an older one if none comes.
     pub async fn next(&self, number: u64, within: Duration) -> Option<Arc<Looked>> {
         let (asked, until) = (now_ns(), tokio::time::Instant::now() + within);
         loop {
             let came = self.use_.came.notified();
             self.use_.asked_ns.store(now_ns(), Ordering::SeqCst);
             let looked = self.other_than(number);
-            // A job that has the camera takes pictures when it needs them: none is fresher.
+            // A job that has the camera takes pictures when it needs them: the newest is as fresh as possible.
             let on_demand = self.use_.busy.load(Ordering::SeqCst) && !self.use_.lent.load(Ordering::SeqCst);
             match looked {
                 Some(looked) if !on_demand || looked.came_ns + FRESH >= asked => return Some(looked),
@@ -144,17 +144,17 @@ impl Camera {
         }
     }
 
-    /// The newest picture, if it is not the one of this number.
+    /// The newest picture, if its number is not `number`.
     pub fn other_than(&self, number: u64) -> Option<Arc<Looked>> {
         lock(&self.state).newest.as_ref().filter(|l| l.number != number).cloned()
     }
 
-    /// How its pictures are read from the sensor, where it says so.
+    /// How its pictures are read from the sensor, if the camera reports it.
     pub fn readout(&self) -> Option<Readout> {
         lock(&self.state).readout
     }
 
-    /// Pictures a second, as it sent them lately; `None`: not known.
+    /// Recent frame rate, Hz; `None`: unknown.
     pub fn rate_hz(&self) -> Option<f64> {
         lock(&self.state).rate_hz
     }
@@ -164,12 +164,12 @@ impl Camera {
         lock(&self.state).account.clone()
     }
 
-    /// When a picture's last byte came, ns of the host's clock; `None`: it is long gone.
+    /// Time at which a picture's last byte arrived, ns of the host's clock; `None` if the picture is too old.
     pub fn moment(&self, number: u64) -> Option<u64> {
         lock(&self.state).moments.iter().find(|(n, _)| *n == number).map(|(_, at)| *at)
     }
 
-    /// Frames by what became of them, delays p50 and p99 in ms, what is wrong.
+    /// Counts of frames by fate, delays p50 and p99 in ms, what is wrong.
     pub fn seen(&self) -> (Frames, Option<[f64; 2]>, Option<String>) {
         let state = lock(&self.state);
         let a = &state.account;
@@ -198,7 +198,7 @@ impl Drop for Camera {
     }
 }
 
-/// Opens the camera, set as it was set from here.
+/// Opens the camera and sets again what was set from here.
 fn open(uri: &CameraUri, raw: Option<RawFormat>, state: &Mutex<State>) -> Result<Box<dyn PictureSource>> {
     let mut source = uri.open(raw)?;
     let (kept, known) = {
@@ -207,7 +207,7 @@ fn open(uri: &CameraUri, raw: Option<RawFormat>, state: &Mutex<State>) -> Result
     };
     for (name, value) in kept {
         if let Err(fault) = source.set(&name, &value) {
-            // Another camera by now, or one that is set elsewhere: it is looked through as it is.
+            // It is now another camera, or it is set elsewhere: its settings are left unchanged.
             let mut state = lock(state);
             state.kept.retain(|(n, _)| *n != name);
             state.wrong = Some(fault.what);
@@ -221,7 +221,7 @@ fn open(uri: &CameraUri, raw: Option<RawFormat>, state: &Mutex<State>) -> Result
     Ok(source)
 }
 
-/// Measures the newest picture, and the next newest, until the source ends.
+/// Measures the newest picture repeatedly, until the source ends.
 fn look(
     source: Box<dyn PictureSource>,
     station: &Path,
@@ -232,7 +232,7 @@ fn look(
     let feed = Feed::start(source, FeedOptions { mode: Mode::Newest, ..FeedOptions::default() })?;
     uses.renewed.store(true, Ordering::SeqCst);
     let mut live = Err(Fault::input("no picture was measured yet").next("wait for the next picture"));
-    // A scan's threads are busy for a batch at a time: a picture does not wait for them.
+    // A scan keeps its threads busy for a batch at a time; with a separate thread a picture does not wait for them.
     let beside = rayon::ThreadPoolBuilder::new().num_threads(1).thread_name(|_| "look beside".into()).build();
     let mut number = lock(tell).newest.as_ref().map_or(0, |l| l.number);
     while !ends() {
@@ -288,7 +288,7 @@ fn look(
     Ok(())
 }
 
-/// The chain for pictures like these.
+/// The measuring chain for pictures of this format.
 fn begin(station: &Path, pictures: Pictures) -> Result<Live> {
     let (settings, rig) = (Settings::load(station)?, Rig::load(station)?);
     Live::new(&rig, pictures, &settings.extraction, volume::believed(&settings, &rig).as_ref(), Where::default())

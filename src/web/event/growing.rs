@@ -1,37 +1,37 @@
-//! In: the profiles of a running scan. Out: its height map as it grows: a row a shot (or a few), a column a piece of
-//! the stripe.
+//! In: the profiles of a running scan. Out: its growing height map: one row per shot (or per few shots), one column
+//! per piece of the stripe.
 //! Frame and unit: heights towards the camera at the first shot, mm; rows in the order of the shots.
 
 use crate::geometry::Vec3;
 use crate::scan::Profile;
 use std::sync::Mutex;
 
-/// Columns across the stripe.
+/// Number of columns along the stripe.
 const COLUMNS: usize = 384;
-/// Rows; a longer scan puts several shots into one.
+/// Most rows; in a longer scan a row combines several shots.
 const MOST_ROWS: usize = 1024;
 /// First word of a message: "GROW".
 const MAGIC: u32 = u32::from_le_bytes(*b"GROW");
 
-/// The picture that grows.
+/// The growing height map.
 #[derive(Default)]
 pub struct Growing(Mutex<Rows>);
 
 #[derive(Default)]
 struct Rows {
     job: u32,
-    /// Shots a row.
+    /// Shots per row.
     every: usize,
     total: usize,
     done: usize,
-    /// Extent of the stripe in the picture: along u or v, from, to; px.
+    /// Whether the stripe runs along v, and its range in the picture, from, to, px.
     stripe: Option<(bool, f32, f32)>,
     heights: Vec<f32>,
     counts: Vec<u32>,
 }
 
 impl Growing {
-    /// Begins for a job of so many shots in pictures of this size.
+    /// Starts the map of a job with this number of shots.
     pub fn begin(&self, job: u32, shots: usize) {
         let every = shots.div_ceil(MOST_ROWS).max(1);
         let rows = shots.div_ceil(every);
@@ -49,7 +49,7 @@ impl Growing {
         self.0.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// Adds a shot; `size` is that of the pictures, px.
+    /// Adds a shot; `size` is the size of the pictures, px.
     pub fn add(&self, profile: &Profile, up: &Vec3, size: [u32; 2]) {
         let mut rows = self.rows();
         let row = profile.shot as usize / rows.every.max(1);
@@ -57,7 +57,7 @@ impl Growing {
             return;
         }
         rows.done = rows.done.max(row + 1);
-        // Along the side of the picture on which the first good stripe is longer.
+        // Columns follow the side of the picture along which the first good stripe is longer.
         if rows.stripe.is_none() && profile.points.len() > 20 {
             let span = |f: &dyn Fn(usize) -> f32| {
                 let values = (0..profile.points.len()).map(f);
@@ -77,14 +77,14 @@ impl Growing {
         }
     }
 
-    /// The job that grows, and its rows so far.
+    /// The job of the map, and its number of rows so far.
     pub fn at(&self) -> (u32, usize) {
         let rows = self.rows();
         (rows.job, rows.done)
     }
 
-    /// Rows from `from` on, little endian: "GROW", job, columns, rows in all, first row, number of rows, then their
-    /// heights as floats, NaN where nothing was seen. `None` where there is nothing new.
+    /// Rows from `from` on, little endian: "GROW", job, columns, total rows, first row, number of rows, then the
+    /// heights as floats, NaN if nothing was measured. `None` if there is no new row.
     pub fn message(&self, from: usize) -> Option<Vec<u8>> {
         let rows = self.rows();
         if rows.done <= from {

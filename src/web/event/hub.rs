@@ -1,4 +1,5 @@
-//! In: events of jobs and bar. Out: each to every viewer; who falls behind hears that, and asks for the whole state.
+//! In: events of jobs and bar. Out: each event to every viewer; a viewer that falls behind is notified, and
+//! requests the whole state.
 //! Frame and unit: none.
 
 use super::Growing;
@@ -7,16 +8,16 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tokio::sync::broadcast;
 
-/// Events that wait for a slow viewer; all viewers share them, so memory does not grow with their number.
+/// Events queued for slow viewers; all viewers share the queue, so memory does not grow with their number.
 const WAITING: usize = 64;
-/// Browsers at a time.
+/// Most viewers at a time.
 const MOST_VIEWERS: usize = 64;
 
-/// Where events go.
+/// Distributes events to viewers.
 pub struct Hub {
-    /// As text: written once for all.
+    /// Events as text, serialized once for all viewers.
     events: broadcast::Sender<Arc<str>>,
-    /// The height map of the scan that runs.
+    /// The height map of the running scan.
     pub growing: Growing,
     viewers: AtomicUsize,
 }
@@ -27,7 +28,7 @@ impl Default for Hub {
     }
 }
 
-/// A place among the viewers, given back when it is dropped.
+/// A slot among the viewers, freed when it is dropped.
 pub struct Seat(Arc<Hub>);
 
 impl Drop for Seat {
@@ -37,7 +38,7 @@ impl Drop for Seat {
 }
 
 impl Hub {
-    /// Tells everybody; nobody is waited for.
+    /// Sends an event to all viewers, without waiting for any.
     pub fn tell(&self, event: &Event) {
         if self.events.receiver_count() > 0 {
             let text = serde_json::to_string(event).expect("plain data");
@@ -45,7 +46,7 @@ impl Hub {
         }
     }
 
-    /// A place to look on from; `None` where all are taken.
+    /// A slot for a viewer; `None` if all are taken.
     pub fn sit(self: &Arc<Hub>) -> Option<(Seat, broadcast::Receiver<Arc<str>>)> {
         if self.viewers.fetch_add(1, Ordering::Relaxed) >= MOST_VIEWERS {
             self.viewers.fetch_sub(1, Ordering::Relaxed);
@@ -54,7 +55,7 @@ impl Hub {
         Some((Seat(self.clone()), self.events.subscribe()))
     }
 
-    /// Browsers that look on.
+    /// Number of viewers.
     pub fn viewers(&self) -> usize {
         self.viewers.load(Ordering::Relaxed)
     }

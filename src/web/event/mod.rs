@@ -1,5 +1,4 @@
-//! In: what happens in jobs. Out: the same to every browser that looks on, newest first; one that is slow misses some
-//! and never holds anything up.
+//! In: what happens in jobs. Out: events for every viewer. A slow viewer misses some and never delays anything.
 //! Frame and unit: bytes, rows of a growing height map (mm).
 
 mod growing;

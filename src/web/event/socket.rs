@@ -1,4 +1,5 @@
-//! In: a viewer's WebSocket. Out: the state, then events and rows of the growing map as fast as the viewer takes them.
+//! In: a viewer's WebSocket. Out: the state, then events and rows of the growing map as fast as the viewer accepts
+//! them.
 //! Frame and unit: seconds, bytes.
 
 use super::Hub;
@@ -12,14 +13,14 @@ use std::time::Duration;
 use tokio::sync::broadcast::{Receiver, error::RecvError};
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
-/// A viewer that takes nothing for so long is let go.
+/// A viewer that accepts nothing for this long is disconnected.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Rows of the growing map are sent this often at most.
+/// Shortest interval between rows of the growing map.
 const PICTURE: Duration = Duration::from_millis(250);
 
-/// Serves one viewer until it goes. `state` is asked for at first and whenever events were missed, beside the
-/// server's own threads: it looks at the disk. `hears` gets what the viewer says, in a task of its own: however long
-/// telling takes, a button that is held is heard.
+/// Serves one viewer until it disconnects. `state` is called at first and whenever events were missed, outside the
+/// server's threads, because it reads the disk. `hears` gets the viewer's messages in a separate task, so that a
+/// held button is noticed however long sending takes.
 pub async fn stream(
     socket: WebSocket,
     hub: Arc<Hub>,
@@ -35,7 +36,7 @@ pub async fn stream(
     }
 }
 
-/// Tells the viewer what happens until it takes nothing any more.
+/// Sends events to the viewer until it accepts no more.
 async fn told(
     mut viewer: SplitSink<WebSocket, Message>,
     hub: &Hub,
@@ -64,8 +65,8 @@ async fn told(
     }
 }
 
-/// Hears the viewer until it goes. All that viewers say here is that a button is held; what they order goes through
-/// the API.
+/// Receives messages until the viewer disconnects. The only message of viewers here is that a button is held;
+/// orders go through the API.
 async fn heard(mut viewer: SplitStream<WebSocket>, hears: impl Fn(&str) + Send) {
     while let Some(Ok(message)) = viewer.next().await {
         match message {
@@ -76,17 +77,17 @@ async fn heard(mut viewer: SplitStream<WebSocket>, hears: impl Fn(&str) + Send) 
     }
 }
 
-/// The state as a message; `None` where the server ends.
+/// The state as a message; `None` if the server is shutting down.
 async fn whole(state: &Arc<impl Fn() -> Event + Send + Sync + 'static>) -> Option<Message> {
     let state = state.clone();
     let text = move || serde_json::to_string(&state()).expect("plain data");
     tokio::task::spawn_blocking(text).await.ok().map(Message::text)
 }
 
-/// What this viewer has not seen of the growing map.
+/// Rows of the growing map that this viewer does not have yet.
 fn rows(hub: &Hub, shown: &mut (u32, usize)) -> Option<Message> {
     let (job, done) = hub.growing.at();
-    // The last row of what was sent may have got more shots since.
+    // The last row that was sent may contain more shots now.
     let from = if job == shown.0 { shown.1.saturating_sub(1) } else { 0 };
     if job == shown.0 && done == shown.1 {
         return None;

@@ -1,5 +1,5 @@
-//! In: every request. Out: refused where host, origin, length or session are wrong; headers on every answer that keep a
-//! page to itself.
+//! In: every request. Out: an error if host, origin, length or session are wrong; headers on every answer that
+//! isolate the page from other sites.
 //! Frame and unit: bytes.
 
 use super::host::Hosts;
@@ -12,22 +12,22 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use std::sync::Arc;
 
-/// Bytes of a request's body: recipes and outlines are far shorter.
+/// Largest body of a request, bytes: recipes and outlines are far shorter.
 pub const MOST_BODY: usize = 1 << 20;
 
-/// What the door knows.
+/// State that the middleware checks requests against.
 pub struct Door {
-    /// By which names this server is called.
+    /// Names by which browsers may call this server.
     pub hosts: Hosts,
-    /// Who is let in.
+    /// The open sessions.
     pub sessions: Arc<Sessions>,
-    /// Lets a program read the figures, and nothing else.
+    /// Token that lets a program read the figures, and nothing else.
     pub metrics: Option<String>,
-    /// Name of the cookie: of the port too, because cookies do not know ports.
+    /// Name of the cookie. It contains the port, because cookies do not depend on the port.
     pub cookie: String,
 }
 
-/// Scripts, styles, pictures and connections from here alone, no frames, no plugins, no inline code.
+/// Scripts, styles, pictures and connections from this server only; no frames, no plugins, no inline code.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
                       connect-src 'self'; \
                       font-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors \
@@ -72,7 +72,7 @@ pub async fn door(
     for (name, value) in HEADERS {
         headers.insert(name, HeaderValue::from_static(value));
     }
-    // Pages and answers change with the station; a browser that keeps them shows what was.
+    // Pages and answers change with the station; a browser that caches them shows an old state.
     headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
     response
 }
@@ -82,7 +82,7 @@ fn refusal(status: StatusCode, why: &str) -> Response {
     (status, axum::Json(body)).into_response()
 }
 
-/// What may be had without a session: pages, which hold no secrets, and the way to get one.
+/// Whether a request needs no session: pages, which contain no secrets, and the request that opens a session.
 fn is_open(method: &Method, path: &str) -> bool {
     let page = !path.starts_with("/api/") && (method == Method::GET || method == Method::HEAD);
     page || (method == Method::POST && path == "/api/v1/session")
@@ -92,7 +92,7 @@ impl Door {
     fn refuses(&self, request: &Request<Body>, peer: &Peer) -> Option<(StatusCode, &'static str)> {
         let headers = request.headers();
         let text = |name: HeaderName| headers.get(name).and_then(|v| v.to_str().ok()).map(str::to_ascii_lowercase);
-        // A page of another name that leads here (DNS rebinding) is not ours.
+        // A page of another name that resolves to this server (DNS rebinding) is rejected.
         if !text(header::HOST).is_some_and(|host| self.hosts.are(&host, peer.local)) {
             return Some((StatusCode::MISDIRECTED_REQUEST, "another host's name: open the address that was printed"));
         }
@@ -111,7 +111,7 @@ impl Door {
         None
     }
 
-    /// Who asks: by cookie, or by the token itself in `Authorization: Bearer`.
+    /// The tab that sends the request: identified by cookie, or by the token in `Authorization: Bearer`.
     fn tab(&self, headers: &HeaderMap) -> Option<Tab> {
         let tab = headers.get("x-sheetlight-tab").and_then(|v| v.to_str().ok()).unwrap_or("none");
         let tab: String = tab.chars().filter(char::is_ascii_alphanumeric).take(32).collect();

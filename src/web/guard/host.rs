@@ -1,19 +1,19 @@
-//! The names by which a browser may call this server: the headers Host and Origin, read as a name or an address with
-//! or without a port, and compared as that.
+//! The names by which a browser may call this server. The headers Host and Origin are parsed as a name or an
+//! address, with or without a port, and compared in that form.
 
 use crate::fault::{Fault, Result};
 use axum::http::uri;
 use std::net::{IpAddr, SocketAddr};
 
-/// A host as a URL names it.
+/// A host as written in a URL.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Name {
-    /// Lower case, no dot at its end.
+    /// Lower case, without a trailing dot.
     Word(String),
     Address(IpAddr),
 }
 
-/// A host and perhaps a port: without one the scheme's own is meant.
+/// A host with an optional port; without one, the default port of the scheme applies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Host {
     name: Name,
@@ -27,7 +27,7 @@ impl Host {
         let host = authority.host();
         let port = match authority.as_str().strip_prefix(host)? {
             "" => None,
-            // A port of more digits, or a name before an @, is no host.
+            // A port with too many digits, or a name before an @, is not a host.
             rest => Some(rest.strip_prefix(':')?.parse().ok()?),
         };
         let inside = host.strip_prefix('[').and_then(|h| h.strip_suffix(']'));
@@ -43,20 +43,20 @@ impl Host {
 /// The names of a server.
 #[derive(Clone, Debug)]
 pub struct Hosts {
-    /// https where certificates were given.
+    /// True: https, because certificates were given.
     pub secure: bool,
-    /// Names that the operator gave.
+    /// Names given by the operator.
     named: Vec<Host>,
 }
 
 impl Hosts {
-    /// Names as the command line gives them: a name or an address, with a port where a proxy has another one.
+    /// Names from the command line: a name or an address, with a port if a proxy uses another one.
     ///
     /// # Errors
-    /// One of them is no host.
+    /// One of them is not a host.
     pub fn new(secure: bool, names: &[String]) -> Result<Hosts> {
         let read = |name: &String| {
-            // An address of IPv6 may stand here without brackets.
+            // An IPv6 address may be written without brackets here.
             let bare = name.parse().ok().map(|address| Host { name: Name::Address(address), port: None });
             bare.or_else(|| Host::read(name)).ok_or_else(|| {
                 Fault::usage(format!("{name:?} is no host's name"))
@@ -71,8 +71,8 @@ impl Hosts {
         if self.secure { "https" } else { "http" }
     }
 
-    /// Whether the header Host of a request that came in at `local` names this server. An address of the other end's
-    /// choice cannot be another site's name, but it has to be the one that was connected to.
+    /// Whether the header Host of a request received at `local` names this server. An address cannot be another
+    /// site's name, but it must be the one that the client connected to.
     pub fn are(&self, host: &str, local: SocketAddr) -> bool {
         Host::read(host).is_some_and(|host| self.is_ours(&host, local))
     }
@@ -93,13 +93,14 @@ impl Hosts {
             }
             Name::Word(word) => word == "localhost" && here.is_loopback(),
         };
-        // A name without a port is good for this port, and for the scheme's own, from which a router may lead here.
+        // A name without a port matches this port, and the scheme's default port, from which a router may forward
+        // to this one.
         let named =
             |n: &Host| n.name == host.name && n.port.map_or(port == default || port == local.port(), |p| p == port);
         called && port == local.port() || self.named.iter().any(named)
     }
 
-    /// What a browser on this machine, or on another one where a name was given, opens.
+    /// The URL to open in a browser on this machine, or on another machine if a name was given.
     pub fn url(&self, local: SocketAddr) -> String {
         let name = match (local.ip(), self.named.first()) {
             (ip, _) if !ip.is_unspecified() => return format!("{}://{local}", self.scheme()),
@@ -146,13 +147,13 @@ mod tests {
         assert!(!tls.origin("null", at("10.0.0.2:443")) && !tls.origin("https://evil.example", at("10.0.0.2:443")));
     }
 
-    /// A server that listens on all addresses of its machine is called by that which the connection came in at.
+    /// A server that listens on all addresses accepts only the address that the connection was made to.
     #[test]
     fn an_address_has_to_be_the_one_that_was_connected_to() {
         let all = Hosts::new(true, &[]).unwrap();
         assert!(all.are("10.0.0.2:8620", at("10.0.0.2:8620")) && !all.are("10.0.0.3:8620", at("10.0.0.2:8620")));
         assert!(!all.are("10.0.0.2:8621", at("10.0.0.2:8620")) && !all.are("0.0.0.0:8620", at("10.0.0.2:8620")));
-        // [::] takes connections of IPv4 too, under mapped addresses.
+        // [::] also accepts IPv4 connections, under mapped addresses.
         assert!(all.are("10.0.0.2:8620", at("[::ffff:10.0.0.2]:8620")));
         assert!(all.are("[fd00::2]:8620", at("[fd00::2]:8620")) && all.are("[FD00:0:0::2]:8620", at("[fd00::2]:8620")));
         assert!(all.are("localhost:8620", at("[::1]:8620")) && !all.are("localhost:8620", at("10.0.0.2:8620")));

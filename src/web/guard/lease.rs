@@ -1,4 +1,5 @@
-//! In: tabs that want to operate. Out: one of them does; the others watch until it is idle for a minute or lets go.
+//! In: tabs that want to operate. Out: one of them operates; the others watch until it is idle for a minute or
+//! releases the lease.
 //! Frame and unit: seconds.
 
 use crate::fault::{Fault, Result};
@@ -6,20 +7,20 @@ use crate::web::message::Lease;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// A tab that does nothing for so long does not operate any more.
+/// A tab without activity for this long stops operating.
 pub const IDLE: Duration = Duration::from_secs(60);
 
-/// Who asks: a browser's tab or a program, within a session.
+/// Sender of a request: a browser's tab or a program, within a session.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Tab {
-    /// The session's name, or that of the token.
+    /// Name of the session, or of the token.
     pub session: String,
-    /// The tab's own, from its header.
+    /// Name of the tab, from its header.
     pub tab: String,
 }
 
 impl Tab {
-    /// A few characters by which people tell tabs apart; no secret.
+    /// A few characters by which people distinguish tabs; not a secret.
     pub fn short(&self) -> String {
         self.tab.chars().take(4).collect()
     }
@@ -30,13 +31,13 @@ struct Held {
     used: Instant,
 }
 
-/// The one lease.
+/// The only lease.
 #[derive(Default)]
 pub struct Leases(Mutex<Option<Held>>);
 
 impl Leases {
-    /// Takes it, or renews it. Refused while another tab holds it, unless `firmly`: a person at the machine may take
-    /// it over. Says whether it came from elsewhere: it was another tab's, or nobody's any more.
+    /// Takes or renews the lease. Returns an error while another tab holds it, unless `firmly`: a person at the
+    /// machine may take it over. Returns true unless this tab already held a lease that is still valid.
     pub fn take(&self, tab: &Tab, firmly: bool) -> Result<bool> {
         let mut held = self.0.lock().unwrap_or_else(|e| e.into_inner());
         match &*held {
@@ -55,7 +56,7 @@ impl Leases {
         }
     }
 
-    /// Refuses a tab that does not hold it; holding it is renewed by this.
+    /// Returns an error for a tab that does not hold the lease; renews the lease of the tab that does.
     pub fn need(&self, tab: &Tab) -> Result<()> {
         let mut held = self.0.lock().unwrap_or_else(|e| e.into_inner());
         match &mut *held {
@@ -69,7 +70,7 @@ impl Leases {
         }
     }
 
-    /// Lets go.
+    /// Releases the lease.
     pub fn release(&self, tab: &Tab) {
         let mut held = self.0.lock().unwrap_or_else(|e| e.into_inner());
         if held.as_ref().is_some_and(|h| h.tab == *tab) {
@@ -77,7 +78,7 @@ impl Leases {
         }
     }
 
-    /// Who holds it, as everybody may know.
+    /// The holder, in the form that every viewer may see.
     pub fn state(&self) -> Lease {
         let held = self.0.lock().unwrap_or_else(|e| e.into_inner());
         match held.as_ref().filter(|h| h.used.elapsed() < IDLE) {
@@ -104,11 +105,11 @@ mod tests {
         leases.release(&tab("b"));
         assert_eq!(leases.state().holder.as_deref(), Some("a"));
         assert!(leases.take(&tab("b"), true).unwrap() && !leases.take(&tab("b"), false).unwrap());
-        // Names that begin alike are other tabs all the same.
+        // Tabs whose names begin alike are different tabs.
         assert!(leases.take(&tab("operator1"), true).unwrap() && leases.take(&tab("operator2"), true).unwrap());
         leases.take(&tab("b"), true).unwrap();
         assert!(leases.need(&tab("a")).is_err());
-        // Of another session, a tab of the same name is another tab.
+        // A tab of the same name in another session is another tab.
         assert!(leases.need(&Tab { session: "t".into(), tab: "b".into() }).is_err());
         // Idle for longer than a minute.
         leases.0.lock().unwrap().as_mut().unwrap().used -= IDLE;

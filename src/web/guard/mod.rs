@@ -1,5 +1,5 @@
-//! In: requests from browsers and programs. Out: only those that may be answered: known host and origin, a session, one
-//! operator, names that stay under their root.
+//! In: requests from browsers and programs. Out: only those that may be answered: known host and origin, a session,
+//! one operator, names that stay below their root.
 //! Frame and unit: none; bytes, seconds.
 
 mod door;

@@ -1,15 +1,16 @@
-//! In: a name that a request gave, and the folder it has to stay in. Out: the path, or a refusal.
+//! In: a name from a request, and the folder that it must stay in. Out: the path, or an error.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
 use std::path::{Path, PathBuf};
 
-/// Folders in a name.
+/// Most folders in a name.
 const DEEPEST: usize = 6;
-/// Bytes of one of its words.
+/// Most bytes of one component of a name.
 const LONGEST: usize = 120;
 
-/// Whether a word can be a file's name here: letters of any script, digits, blanks and `. _ - + ( )`, no dot in front.
+/// Whether a word is allowed as a file name here: letters of any script, digits, spaces and `. _ - + ( )`, no
+/// leading dot.
 pub fn plain(word: &str) -> bool {
     !word.is_empty()
         && word.len() <= LONGEST
@@ -18,8 +19,8 @@ pub fn plain(word: &str) -> bool {
         && word.chars().all(|c| c.is_alphanumeric() || " ._-+()".contains(c))
 }
 
-/// The path of something that is there under `root`. Refuses names with `..`, absolute ones, NUL and other marks, and
-/// links that lead out; the refusal says nothing of what lies outside.
+/// The path of an existing entry under `root`. Returns an error for names with `..`, absolute names, NUL and other
+/// characters, and links that lead outside. The error does not reveal what lies outside.
 pub fn resolve(root: &Path, name: &str) -> Result<PathBuf> {
     let words: Vec<&str> = name.split('/').collect();
     if words.len() > DEEPEST || !words.iter().all(|w| plain(w)) {

@@ -1,16 +1,16 @@
-//! In: a password. Out: its Argon2id hash as a PHC string, and whether a password is that of such a hash.
+//! In: a password. Out: its Argon2id hash as a PHC string, and whether a password matches such a hash.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
 use argon2::Argon2;
 use argon2::password_hash::{PasswordHash, PasswordHasher, PasswordVerifier, SaltString};
 
-/// Characters of a password: shorter ones are guessed.
+/// Fewest characters of a password: shorter ones can be guessed.
 const SHORTEST: usize = 10;
-/// Longer ones are a mistake, and cost time.
+/// Most characters of a password: longer ones are a mistake, and cost time.
 const LONGEST: usize = 256;
 
-/// Hashes a new password. Errors: too short or too long.
+/// Hashes a new password. Returns an error if it is too short or too long.
 pub fn hashed(password: &str) -> Result<String> {
     let length = password.chars().count();
     if !(SHORTEST..=LONGEST).contains(&length) {
@@ -24,7 +24,7 @@ pub fn hashed(password: &str) -> Result<String> {
         .to_string())
 }
 
-/// Whether `password` is that of the hash; errors where the hash is none.
+/// Whether `password` matches the hash. Returns an error if `hash` is not a valid hash.
 pub fn verify(password: &str, hash: &str) -> Result<bool> {
     let parsed = PasswordHash::new(hash.trim()).map_err(|e| {
         Fault::input(format!("the password file contains no Argon2 hash: {e}"))

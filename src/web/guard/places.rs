@@ -1,5 +1,5 @@
-//! Places of connections. Who shows a session gets a place that nobody takes from him; everybody else shares others, of
-//! which the machine that has most gives up its oldest.
+//! Slots for connections. A connection that shows a session gets a slot that it keeps. All other connections share
+//! the remaining slots; if these are full, the machine with most connections loses its oldest one.
 
 use futures_util::task::AtomicWaker;
 use std::collections::{BTreeMap, HashMap};
@@ -8,18 +8,18 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::Context;
 
-/// Connections that have shown no session: those that browsers open in advance, a page before its first request, and
-/// whoever only knocks.
+/// Most connections without a session: those that browsers open in advance, a page before its first request, and
+/// clients that never open a session.
 const STRANGERS: usize = 128;
-/// Of these one machine has at most so many.
+/// Most of them from one machine.
 const STRANGERS_OF_ONE: usize = 64;
-/// Connections of sessions: 64 viewers, each with its socket and the six that a browser has beside it.
+/// Most connections with a session: 64 viewers, each with its WebSocket and six further connections of its browser.
 const GUESTS: usize = 448;
-/// Of these one machine has at most so many: a program that opens ever more leaves places for others.
+/// Most of them from one machine: a program that opens many connections leaves slots for other machines.
 const GUESTS_OF_ONE: usize = 384;
 
-/// What counts as one machine: an address, of IPv6 on the internet a network of 64 bits, because there one machine may
-/// choose among all of its addresses.
+/// What counts as one machine: an address. For public IPv6 addresses the network of 64 bits counts, because one
+/// machine may use all of its addresses.
 pub fn machine(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(v6) if !v6.is_unicast_link_local() && !v6.is_unique_local() => {
@@ -29,24 +29,24 @@ pub fn machine(address: IpAddr) -> IpAddr {
     }
 }
 
-/// All places.
+/// All slots.
 #[derive(Debug, Default)]
 pub struct Places(Mutex<Taken>);
 
 #[derive(Debug, Default)]
 struct Taken {
     next: u64,
-    /// By number: the oldest first.
+    /// By number, so oldest first.
     strangers: BTreeMap<u64, Arc<Place>>,
     guests: HashMap<IpAddr, usize>,
 }
 
 const STRANGER: u8 = 0;
 const GUEST: u8 = 1;
-/// It made room for another one.
+/// Its slot was given to another connection.
 const GONE: u8 = 2;
 
-/// The place of one connection.
+/// The slot of one connection.
 #[derive(Debug)]
 pub struct Place {
     number: u64,
@@ -56,12 +56,12 @@ pub struct Place {
 }
 
 impl Place {
-    /// A session was shown on this connection.
+    /// True if a session was shown on this connection.
     pub fn is_guest(&self) -> bool {
         self.is.load(Ordering::SeqCst) == GUEST
     }
 
-    /// Whether it has to go; else the task is woken when it has.
+    /// Whether the connection must close; if not, the task is woken when it must.
     pub fn is_gone(&self, cx: &Context) -> bool {
         self.task.register(cx.waker());
         self.is.load(Ordering::SeqCst) == GONE
@@ -69,9 +69,9 @@ impl Place {
 }
 
 impl Taken {
-    /// The stranger that makes room for one more of this machine.
+    /// The connection without a session that must close before one more of this machine is accepted.
     fn too_many(&self, machine: IpAddr) -> Option<u64> {
-        // Of each machine how many, and the oldest.
+        // Count and oldest connection of each machine.
         let mut of = HashMap::<IpAddr, (usize, u64)>::new();
         self.strangers.values().for_each(|p| of.entry(p.machine).or_insert((0, p.number)).0 += 1);
         let own = of.get(&machine).filter(|(many, _)| *many >= STRANGERS_OF_ONE);
@@ -85,7 +85,7 @@ impl Places {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A place for a connection that was just made, which is given back with the seat.
+    /// A slot for a new connection; it is freed when the seat is dropped.
     pub fn take(self: &Arc<Places>, from: IpAddr) -> Seat {
         let machine = machine(from);
         let mut taken = self.taken();
@@ -100,8 +100,8 @@ impl Places {
         Seat { places: self.clone(), place }
     }
 
-    /// A request on this connection showed a session: from now on nobody takes its place. Where all those places are
-    /// taken it stays a stranger, and is served all the same.
+    /// A request on this connection showed a session: from now on the connection keeps its slot. If all such slots
+    /// are taken, it stays among those without a session, and is served too.
     pub fn shows_session(&self, place: &Place) {
         if place.is.load(Ordering::SeqCst) != STRANGER {
             return;
@@ -115,7 +115,7 @@ impl Places {
     }
 }
 
-/// A place that is taken; dropped with its connection.
+/// A taken slot; dropped with its connection.
 #[derive(Debug)]
 pub struct Seat {
     pub places: Arc<Places>,
@@ -155,9 +155,9 @@ mod tests {
         let quiet = places.take(ip("10.0.0.2"));
         let flood: Vec<Seat> = (0..1000).map(|_| places.take(ip("10.0.0.9"))).collect();
         assert!(!gone(&guest) && !gone(&quiet) && flood.iter().filter(|s| !gone(s)).count() == STRANGERS_OF_ONE);
-        // The newest of them are those that stay.
+        // The newest connections are those that stay.
         assert!(flood[1000 - STRANGERS_OF_ONE..].iter().all(|s| !gone(s)));
-        // Many machines at once: those that have most give way, whoever has one keeps it.
+        // Many machines at once: those with most connections lose some, a machine with one keeps it.
         let floods: Vec<Seat> = (0..300).map(|k| places.take(ip(&format!("10.0.1.{}", k % 3)))).collect();
         assert!(!gone(&guest) && !gone(&quiet));
         let open = flood.iter().chain(&floods).filter(|s| !gone(s)).count();

@@ -1,4 +1,5 @@
-//! In: the token of this start, a password. Out: sessions that a cookie names; a program may show the token itself.
+//! In: the token of this program start, a password. Out: sessions identified by a cookie; a program may send the
+//! token itself.
 //! Frame and unit: seconds.
 
 use rand::TryRngCore;
@@ -7,19 +8,19 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Sessions at a time; the one that was used longest ago falls out.
+/// Most sessions at a time; a new one replaces the one that was used longest ago.
 const MOST: usize = 256;
-/// A session that nobody used for so long is over.
+/// A session that is unused for this long is over.
 const LONGEST_IDLE: Duration = Duration::from_secs(12 * 3600);
 
-/// Who may talk to this start of the program.
+/// Clients that may talk to this start of the program.
 pub struct Sessions {
-    /// Hash of the token: what is compared takes the same time however much of it is right.
+    /// Hash of the token: comparing hashes does not reveal by its duration how much of a token is right.
     token: [u8; 32],
     open: Mutex<HashMap<[u8; 32], Instant>>,
 }
 
-/// 32 hexadecimal digits of the system's randomness.
+/// 32 hexadecimal digits from the system's random generator.
 pub fn random_hex() -> String {
     let mut bytes = [0u8; 16];
     rand::rngs::OsRng.try_fill_bytes(&mut bytes).expect("the system gives random bytes");
@@ -31,7 +32,7 @@ fn hash(text: &str) -> [u8; 32] {
 }
 
 impl Sessions {
-    /// None yet; `token` opens them.
+    /// No sessions yet; `token` opens them.
     pub fn new(token: &str) -> Sessions {
         Sessions { token: hash(token), open: Mutex::default() }
     }
@@ -41,7 +42,7 @@ impl Sessions {
         hash(given) == self.token
     }
 
-    /// A new session; its name goes into the cookie.
+    /// Opens a session; returns its name, which goes into the cookie.
     pub fn open(&self) -> String {
         let name = random_hex();
         let mut open = self.open.lock().unwrap_or_else(|e| e.into_inner());
@@ -54,7 +55,7 @@ impl Sessions {
         name
     }
 
-    /// Whether a cookie's session is open; it is used by this.
+    /// Whether a cookie's session is open; counts as use of the session.
     pub fn knows(&self, name: &str) -> bool {
         let mut open = self.open.lock().unwrap_or_else(|e| e.into_inner());
         match open.get_mut(&hash(name)) {

@@ -1,4 +1,4 @@
-//! Connections from a listening socket, encrypted where a certificate was given, never more than there are places.
+//! Connections from a listening socket, encrypted if a certificate was given, never more than there are slots.
 
 use super::places::{Place, Places, Seat, machine};
 use crate::fault::{Fault, Result};
@@ -22,15 +22,15 @@ use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use tokio_rustls::server::TlsStream;
 
-/// A connection that has shown no session is closed when nothing moved on it for so long. Browsers open some in advance
-/// and never use them.
+/// A connection without a session is closed after this time without traffic. Browsers open some in advance and
+/// never use them.
 const SILENT: Duration = Duration::from_secs(10);
-/// One that has is closed after this time; the screen's own socket is told something every second.
+/// The same for a connection with a session; the screen's WebSocket gets a message every second.
 const IDLE: Duration = Duration::from_secs(300);
-/// A client that does not finish its handshake in so long is let go.
+/// A client that does not finish its handshake within this time is disconnected.
 const HANDSHAKE: Duration = Duration::from_secs(10);
 
-/// Reads a certificate's chain and its key (PEM).
+/// Reads a certificate chain and its key (PEM).
 pub fn tls(certificates: &Path, key: &Path) -> Result<TlsAcceptor> {
     let bad = |path: &Path, e: &dyn std::fmt::Display| {
         Fault::input(format!("{}: cannot be used for TLS: {e}", path.display()))
@@ -45,14 +45,14 @@ pub fn tls(certificates: &Path, key: &Path) -> Result<TlsAcceptor> {
     Ok(TlsAcceptor::from(Arc::new(config.map_err(|e| bad(certificates, &e))?)))
 }
 
-/// Where connections come in.
+/// The listener that accepts connections.
 pub struct Doorway {
     address: SocketAddr,
     ready: mpsc::Receiver<Connection>,
 }
 
 impl Doorway {
-    /// Accepts in the background, so that a slow handshake keeps nobody else waiting.
+    /// Accepts in the background, so that a slow handshake delays no other connection.
     pub fn new(listener: TcpListener, tls: Option<TlsAcceptor>) -> io::Result<Doorway> {
         let address = listener.local_addr()?;
         let (give, ready) = mpsc::channel(16);
@@ -65,7 +65,7 @@ async fn accept(listener: TcpListener, tls: Option<TlsAcceptor>, give: mpsc::Sen
     let places = Arc::new(Places::default());
     loop {
         let Ok((stream, from)) = listener.accept().await else {
-            // Out of file handles: others have to go first.
+            // Out of file handles: other connections must close first.
             tokio::time::sleep(Duration::from_millis(100)).await;
             continue;
         };
@@ -85,7 +85,7 @@ async fn accept(listener: TcpListener, tls: Option<TlsAcceptor>, give: mpsc::Sen
     }
 }
 
-/// A finished handshake; `None` where it fails, takes too long, or makes room for another connection.
+/// A finished handshake; `None` if it fails, takes too long, or its slot is given to another connection.
 async fn shaken<T>(handshake: impl Future<Output = io::Result<T>>, place: &Place) -> Option<T> {
     let gone = poll_fn(|cx| if place.is_gone(cx) { Poll::Ready(()) } else { Poll::Pending });
     tokio::select! {
@@ -113,17 +113,17 @@ impl Listener for Doorway {
     }
 }
 
-/// The other end of a connection, as requests know it.
+/// The other end of a connection, as requests see it.
 #[derive(Clone, Debug)]
 pub struct Peer {
     from: SocketAddr,
-    /// Where the connection came in.
+    /// The local address of the connection.
     pub local: SocketAddr,
     seat: Arc<Seat>,
 }
 
 impl Peer {
-    /// The machine there.
+    /// The machine at the other end.
     pub fn machine(&self) -> IpAddr {
         machine(self.from.ip())
     }
@@ -145,7 +145,7 @@ enum Stream {
     Tls(Box<TlsStream<TcpStream>>),
 }
 
-/// One connection; its place is given back when it and its requests have gone.
+/// One connection; its slot is freed when the connection and its requests have ended.
 pub struct Connection {
     io: Stream,
     peer: Peer,
@@ -155,7 +155,8 @@ pub struct Connection {
 }
 
 impl Connection {
-    /// Why the connection ends although its other end has not closed it: it made room, or nothing moved for too long.
+    /// Why the connection ends although its peer has not closed it: its slot was needed, or it was idle for too
+    /// long.
     fn over(&mut self, cx: &mut Context) -> Poll<io::Error> {
         let place = &self.peer.seat.place;
         if place.is_gone(cx) {
@@ -231,7 +232,7 @@ mod tests {
         Ok(answer)
     }
 
-    /// A server that takes every request with the word `me` for one with a session.
+    /// A server that treats every request to `/me` as one with a session.
     fn served(what: impl AsyncFnOnce(SocketAddr)) {
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
         runtime.block_on(async {
@@ -257,8 +258,8 @@ mod tests {
         Ok(answer[..read].ends_with(b"here"))
     }
 
-    /// More connections than there are places, some silent, some in the midst of a request that they never end: who
-    /// speaks is answered, who has shown a session keeps his connection, and a silent one ends by itself.
+    /// More connections than slots, some silent, some with a request that they never end. A client that sends a
+    /// request is answered, a connection with a session stays, and a silent one is closed in time.
     #[test]
     fn idle_connections_lock_nobody_out() {
         served(async |to| {
@@ -268,7 +269,7 @@ mod tests {
             for k in 0..600 {
                 let mut stream = TcpStream::connect(to).await.unwrap();
                 if k % 2 == 1 {
-                    // Whose place was taken meanwhile is told so.
+                    // The write fails if the connection's slot was given away meanwhile.
                     let _ = stream.write_all(b"GET /me HTTP/1.1\r\nhost").await;
                 }
                 idle.push(stream);

@@ -1,4 +1,5 @@
-//! Passwords are tried slowly: each machine's tries come one after the other, and wait for no other machine's.
+//! Limits the rate of password tries: tries of one machine are made one after the other, without delaying those of
+//! other machines.
 
 use super::password::verify;
 use crate::fault::{Fault, Result};
@@ -9,13 +10,13 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::sync::oneshot;
 
-/// Between two tries of one machine; a wrong one is answered no sooner.
+/// Time between two tries of one machine; a wrong try is answered no sooner than this.
 const SLOWLY: Duration = Duration::from_millis(700);
-/// A try that would have to wait longer than this is refused.
+/// A try that would have to wait longer than this is rejected.
 const LONGEST: Duration = Duration::from_millis(2100);
-/// Machines whose tries are counted at a time.
+/// Most machines whose tries are counted at a time.
 const MACHINES: usize = 1024;
-/// Passwords that wait for the one thread that hashes; a hash takes about 30 ms and 19 MiB.
+/// Most passwords that wait for the one hashing thread; a hash takes about 30 ms and 19 MiB.
 const WAITING: usize = 32;
 
 struct Try {
@@ -23,29 +24,29 @@ struct Try {
     known: oneshot::Sender<Result<bool>>,
 }
 
-/// The password's door.
+/// Checks passwords at a limited rate.
 pub struct Tries {
-    /// When each machine's next try may begin.
+    /// Earliest start of each machine's next try.
     next: Mutex<HashMap<IpAddr, Instant>>,
     hashing: SyncSender<Try>,
 }
 
-/// What came of a try.
+/// Result of a try.
 #[derive(Debug)]
 pub enum Tried {
-    /// It is the password.
+    /// The password is right.
     Right,
-    /// It is not.
+    /// The password is wrong.
     Wrong,
-    /// Too many were tried: after so long another one may be.
+    /// Too many tries: another one may be made after this time.
     TooMany(Duration),
 }
 
 impl Tries {
-    /// Tries against this hash, on a thread of its own.
+    /// Checks tries against this hash, on a separate thread.
     ///
     /// # Errors
-    /// No thread can be had.
+    /// No thread can be started.
     pub fn against(hash: String) -> Result<Tries> {
         let (hashing, asked) = sync_channel(WAITING);
         let work = move || hash_each(&asked, &hash);
@@ -53,10 +54,10 @@ impl Tries {
         Ok(Tries { next: Mutex::default(), hashing })
     }
 
-    /// Tries one; `from` is the machine that asks.
+    /// Checks one password; `from` is the machine that sends it.
     ///
     /// # Errors
-    /// The hash is none, or the thread ended in a bug.
+    /// The hash is invalid, or the thread panicked.
     pub async fn one(&self, from: IpAddr, password: String) -> Result<Tried> {
         let wait = match self.book(from, Instant::now()) {
             Ok(wait) => wait,
@@ -79,8 +80,8 @@ impl Tries {
         Ok(Tried::Wrong)
     }
 
-    /// How long a machine's try has to wait. It is booked: who hangs up before its answer wins nothing. Where it would
-    /// have to wait too long: after how long to come again.
+    /// How long a machine's try must wait. The time is reserved, so a client that disconnects before its answer
+    /// gains nothing. If the wait would be too long, the error is the time after which to try again.
     fn book(&self, from: IpAddr, now: Instant) -> std::result::Result<Duration, Duration> {
         let mut next = self.next.lock().unwrap_or_else(PoisonError::into_inner);
         let wait = next.get(&from).map_or(Duration::ZERO, |free| free.saturating_duration_since(now));
@@ -98,10 +99,10 @@ impl Tries {
     }
 }
 
-/// Hashes until nobody asks any more.
+/// Hashes until all senders are gone.
 fn hash_each(asked: &Receiver<Try>, hash: &str) {
     for Try { password, known } in asked {
-        // Whoever asked may have gone.
+        // The client may have disconnected.
         let _ = known.send(verify(&password, hash));
     }
 }
@@ -137,8 +138,8 @@ mod tests {
         assert_eq!(tries.book(ip(1), now + SLOWLY), Ok(Duration::ZERO), "they are forgotten when their time is over");
     }
 
-    /// One machine tries wrong passwords without end, and hangs up on its tries: the right one of another machine does
-    /// not wait for them.
+    /// One machine sends wrong passwords without end and disconnects before the answers: the right one of another
+    /// machine does not wait for them.
     #[test]
     fn wrong_passwords_keep_no_other_machine_waiting() {
         const WRONG: u32 = 50;
@@ -152,7 +153,7 @@ mod tests {
             assert!(matches!(tries.one(ip(1), "correct horse battery".into()).await, Ok(Tried::TooMany(_))));
             let begun = Instant::now();
             assert!(matches!(tries.one(ip(2), "correct horse battery".into()).await, Ok(Tried::Right)));
-            // One after the other they would take so long; a right one takes as long as a hash.
+            // One after the other, the wrong tries would take this long; a right one takes as long as a hash.
             println!("the right password was known after {:?}", begun.elapsed());
             assert!(begun.elapsed() < SLOWLY * WRONG / 2, "{:?}", begun.elapsed());
             let begun = Instant::now();

@@ -1,15 +1,15 @@
-//! In: nothing. Out: what the bar that never leaves shows.
-//! Frame and unit: frames counted, ms, days, mm, GB as the names say.
+//! In: nothing. Out: the content of the bar that every page shows.
+//! Frame and unit: counts of frames; ms, days, mm, GB as the names say.
 
 use serde::Serialize;
 use std::collections::BTreeMap;
 use ts_rs::TS;
 
-/// Where what is shown comes from.
+/// Source of the pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, TS)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
-    /// A camera that runs.
+    /// A running camera.
     Live,
     /// Recordings on disk.
     Replay,
@@ -21,85 +21,86 @@ pub enum Mode {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, TS)]
 #[serde(rename_all = "snake_case")]
 pub enum RobotState {
-    /// No robot was named, or it does not answer.
+    /// No robot is configured, or it does not answer.
     NoLink,
-    /// Its state is read, it is never moved.
+    /// Its state is read; it is never moved.
     ReadOnly,
-    /// It was taken for motions, each of which is confirmed.
+    /// It is armed for motions, each of which is confirmed.
     Armed,
     /// It moves.
     Moving,
 }
 
-/// Frames of the scan that runs, or of the last one.
+/// Frames of the running scan, or of the last one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, TS)]
 pub struct Frames {
-    /// Handed to the stages.
+    /// Passed to the processing stages.
     #[ts(type = "number")]
     pub seen: u64,
     /// With at least one point.
     #[ts(type = "number")]
     pub measured: u64,
-    /// Left out, by cause.
+    /// Frames without a result, by cause.
     #[ts(type = "Record<string, number>")]
     pub dropped: BTreeMap<String, u64>,
 }
 
-/// How old the oldest calibration of the rig is, and what all of them make expect.
+/// Age of the rig's oldest calibration, and the error expected from all of them.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct CalibrationAge {
     /// Days since the oldest record was measured.
     pub days: f64,
     /// The worst verdict of all records.
     pub verdict: String,
-    /// Which record has it.
+    /// The record with that verdict.
     pub worst: String,
-    /// Root of the sum of squares of what each expects at the working distance, mm; null where one does not say.
+    /// Root sum of squares of the errors that the records expect at the working distance, mm; null if one does not
+    /// state it.
     pub expected_mm: Option<f64>,
 }
 
-/// Who may operate.
+/// The tab that may operate.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, TS)]
 pub struct Lease {
-    /// A short name of the tab that holds it; null: nobody.
+    /// A short name of the tab that holds the lease; null: no tab holds it.
     pub holder: Option<String>,
-    /// Seconds until it falls free.
+    /// Seconds until the lease expires.
     pub seconds_left: f64,
 }
 
 /// The bar.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct Bar {
-    /// Where pictures come from.
+    /// Source of the pictures.
     pub mode: Mode,
     /// Name of the station.
     pub station: String,
-    /// A camera was named.
+    /// A camera is configured.
     pub camera: bool,
     /// What the robot may do.
     pub robot: RobotState,
-    /// Line or pointer is on, by the controller's outputs; null without a link that can say.
+    /// Line or pointer is on, by the controller's outputs; null if no link reports it.
     pub laser: Option<bool>,
-    /// Of the running scan.
+    /// Frames of the running scan, or of the last one.
     pub frames: Frames,
-    /// From a picture to its points, p50 and p99, ms; null where none was measured yet.
+    /// Time from a picture to its points, p50 and p99, ms; null if not measured yet.
     pub delay_ms: Option<[f64; 2]>,
-    /// What the stages run on.
+    /// Adapter or processor that runs the stages.
     pub adapter: String,
-    /// It is software on this machine's cores.
+    /// The adapter is software on this machine's cores.
     pub adapter_is_software: bool,
-    /// Null without camera, laser plane or what carries them.
+    /// Null without a camera, a laser plane, or the calibration of the motion that carries them.
     pub calibration: Option<CalibrationAge>,
-    /// On the disk that holds the jobs, GB; null where the system does not say.
+    /// Free space on the disk that holds the jobs, GB; null if the system does not report it.
     pub disk_left_gb: Option<f64>,
-    /// Memory of the program, now and at its most, MB; null where the system does not say.
+    /// Memory of the program, now and at its peak, MB; null if the system does not report it.
     pub memory_mb: Option<[f64; 2]>,
-    /// What an operator must know now, one sentence each.
+    /// What the operator must know now, one sentence each.
     pub alarms: Vec<String>,
-    /// Who operates.
+    /// The tab that may operate.
     pub lease: Lease,
-    /// The job that runs.
+    /// The running job; null: none runs.
     pub running: Option<String>,
-    /// Browsers that look on.
+    /// Number of connected browsers.
     pub viewers: usize,
 }

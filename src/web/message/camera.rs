@@ -1,5 +1,5 @@
-//! In: nothing. Out: a camera's settings and what its pictures show, as pages see them.
-//! Frame and unit: features by their standard names (ExposureTime in us); px; shares of full scale and of the
+//! In: nothing. Out: a camera's settings and measures of its pictures, as pages see them.
+//! Frame and unit: features by their standard names (ExposureTime in us); px; fractions of full scale and of the
 //! stripe's length.
 
 use crate::capture::{Feature, Look, Range, Value, WANTED};
@@ -9,23 +9,23 @@ use ts_rs::TS;
 /// The camera.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct CameraState {
-    /// What it can be set to; empty where nothing can, or while it is not there.
+    /// Its settings; empty if it has none, or while it is not connected.
     pub features: Vec<CameraFeature>,
 }
 
 /// One setting of a camera.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct CameraFeature {
-    /// By the naming convention.
+    /// Name of the feature by the standard naming convention.
     pub name: String,
-    /// What it is; null where it cannot be read.
+    /// Current value; null if it cannot be read.
     #[ts(type = "number | boolean | string | null")]
     pub value: Option<serde_json::Value>,
-    /// us, dB, px, Hz; empty where it has none.
+    /// us, dB, px, Hz; empty if it has none.
     pub unit: String,
-    /// Lowest and highest; null: none that is known.
+    /// Lowest and highest value; null: unknown.
     pub range: Option<[f64; 2]>,
-    /// One of these; empty: not a list.
+    /// The allowed values; empty if the feature is not an enumeration.
     pub words: Vec<String>,
     /// Whether it can be set now.
     pub writable: bool,
@@ -45,48 +45,48 @@ impl From<&Feature> for CameraFeature {
     }
 }
 
-/// A setting to be made.
+/// A setting to change.
 #[derive(Clone, Debug, PartialEq, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct SetFeature {
-    /// By the naming convention, e.g. ExposureTime.
+    /// Name of the feature by the standard naming convention, e.g. ExposureTime.
     pub name: String,
-    /// As text.
+    /// The value as text.
     pub value: String,
 }
 
-/// What a picture shows.
+/// Measures of a picture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct PictureLook {
-    /// Lowest, median, 99th percentile, highest level.
+    /// Lowest, median, 99th percentile and highest grey level.
     pub levels: [u16; 4],
-    /// Share of saturated pixels.
+    /// Fraction of saturated pixels.
     pub saturated: f64,
-    /// Null where no line of the picture shows a stripe.
+    /// Null if no stripe is visible.
     pub stripe: Option<StripeSeen>,
 }
 
-/// A stripe, looked at across.
+/// Measures of a stripe across its direction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct StripeSeen {
-    /// It lies: it is looked at column by column.
+    /// The stripe is horizontal, so it is measured column by column.
     pub lying: bool,
-    /// Level that a twentieth of its peaks are above, share of full scale.
+    /// Level that 5 % of its peaks exceed, fraction of full scale.
     pub peak: f64,
-    /// Where that is to stand.
+    /// Range in which `peak` should lie.
     pub wanted: [f64; 2],
-    /// Share of its peaks that are saturated.
+    /// Fraction of its peaks that are saturated.
     pub saturated: f64,
-    /// Full width at half height, px, median.
+    /// Full width at half maximum, px, median.
     pub width_px: f64,
-    /// Its peak against the level beside it, median.
+    /// Its peak relative to the level beside it, median.
     pub contrast: f64,
-    /// Share of the lines without a stripe.
+    /// Fraction of the lines without a stripe.
     pub dark: f64,
-    /// Exposure is right.
+    /// The exposure is right.
     pub right: bool,
-    /// The same in pieces along it, from the left or the top: peak, width in px, contrast, dark share; the first
-    /// three are 0 where it is dark.
+    /// The same for pieces along the stripe, from the left or the top: peak, width in px, contrast, dark fraction.
+    /// The first three are 0 where the stripe is dark.
     pub pieces: Vec<[f64; 4]>,
 }
 
@@ -107,15 +107,15 @@ impl From<&Look> for PictureLook {
     }
 }
 
-/// An exposure that was looked for.
+/// Result of the automatic exposure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct ExposureSet {
-    /// us; it is set.
+    /// The exposure that was set, us.
     pub exposure_us: f64,
-    /// What was tried: us, and where the stripe's peaks stood, share of full scale; null: no stripe.
+    /// Exposures tried: us, and the level of the stripe's peaks, fraction of full scale; null: no stripe.
     pub tried: Vec<(f64, Option<f64>)>,
-    /// What pictures show now.
+    /// Measures of the pictures now.
     pub look: PictureLook,
-    /// Where no exposure is quite right: why this one is the best.
+    /// If no exposure is quite right: why this one is the best.
     pub remark: Option<String>,
 }

@@ -1,32 +1,32 @@
-//! In: nothing. Out: how a session is opened, who operates, and how a motion is confirmed.
-//! Frame and unit: poses by their hash.
+//! In: nothing. Out: how a session is opened, which tab operates, and how a motion is confirmed.
+//! Frame and unit: motions by their hash.
 
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
 
-/// Opens a session: one of the two.
+/// Opens a session by one of these two.
 #[derive(Deserialize, TS)]
 #[serde(deny_unknown_fields, default)]
 #[derive(Default)]
 pub struct Knock {
-    /// Of this start of the program.
+    /// The token of this program start.
     pub token: Option<String>,
-    /// Where the screen is served to other machines.
+    /// The password, if the screen is served to other machines.
     pub password: Option<String>,
 }
 
 /// A session.
 #[derive(Serialize, TS)]
 pub struct Session {
-    /// A short name of the tab that asks.
+    /// A short name of the tab that sent the request.
     pub tab: String,
 }
 
-/// Operate from this tab.
+/// Takes the lease for this tab.
 #[derive(Default, Deserialize, TS)]
 #[serde(deny_unknown_fields, default)]
 pub struct TakeLease {
-    /// Also where another one operates.
+    /// Takes it even if another tab operates.
     pub firmly: bool,
 }
 
@@ -34,16 +34,16 @@ pub struct TakeLease {
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct Confirmed {
-    /// The job that asks.
+    /// The job that proposes the motion.
     pub job: String,
     /// `hash` of the motion that was shown.
     pub hash: String,
 }
 
-/// The right to one motion.
+/// A confirmation of one motion.
 #[derive(Serialize, TS)]
 pub struct Grant {
-    /// The name under which it is redeemed, once.
+    /// The name under which the confirmation is redeemed once.
     pub grant: String,
 }
 
@@ -51,8 +51,8 @@ pub struct Grant {
 #[derive(Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct Redeem {
-    /// What pressing it gave.
+    /// The grant that pressing the button returned.
     pub grant: String,
-    /// What is confirmed, again.
+    /// The confirmed motion again.
     pub what: Confirmed,
 }

@@ -1,68 +1,68 @@
-//! In: nothing. Out: a drawing of a part to make a recipe of, and what was read of it.
+//! In: nothing. Out: a drawing of a part to make a recipe from, and what was read from it.
 //! Frame and unit: part frame, mm, degrees.
 
 use super::RecipeText;
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
 
-/// A drawing, and what it is for.
+/// A drawing, and the recipe to make from it.
 #[derive(Clone, Debug, PartialEq, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct DrawingAsk {
-    /// What the recipe is called.
+    /// Name of the recipe.
     pub name: String,
     /// ASCII DXF.
     pub text: String,
-    /// mm, inch, cm, m, um, mil or foot, where the drawing names none; null: the one it names.
+    /// Unit if the drawing states none: mm, inch, cm, m, um, mil or foot; null: the unit stated in the drawing.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub unit: Option<String>,
-    /// Layers that hold the part's edges; none: all that are shown.
+    /// Layers that contain the part's edges; empty: all visible layers.
     #[serde(default)]
     pub layers: Vec<String>,
-    /// The insertion datum in the drawing, in its unit; null: the middle of the largest outline's box.
+    /// The insertion datum in the drawing, in its unit; null: the middle of the largest outline's bounding box.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub origin: Option<[f64; 2]>,
-    /// How many turns make the part look nearly alike.
+    /// Number of rotations at which the part looks nearly alike.
     pub alike_turns: u32,
-    /// Edge of a cell of the map that is searched, mm.
+    /// Cell size of the map that is searched, mm.
     pub cell_mm: f64,
-    /// What the insertion bears in the plane, mm.
+    /// Tolerance of the insertion in the plane, mm.
     pub tolerance_mm: f64,
-    /// What it bears as a turn, degrees.
+    /// Tolerance of its rotation, degrees.
     pub tolerance_deg: f64,
-    /// The tool's way above the insertion pose before and after, mm.
+    /// Distance of the tool above the insertion pose before and after the insertion, mm.
     pub approach_mm: f64,
-    /// It takes the place of the station's own recipe of that name.
+    /// Replaces the station's recipe of that name.
     #[serde(default)]
     pub replace: bool,
 }
 
-/// A recipe's text, and what changes of its constructed points.
+/// A recipe's text, and the change to its constructed points.
 #[derive(Clone, Debug, PartialEq, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct PointsChange {
     /// TOML; it need not be stored.
     pub text: String,
-    /// What changes.
+    /// The change.
     pub change: PointChange,
 }
 
-/// What changes of a recipe's constructed points.
+/// A change to a recipe's constructed points.
 #[derive(Clone, Debug, PartialEq, Deserialize, TS)]
 #[serde(rename_all = "snake_case")]
 pub enum PointChange {
-    /// One more, behind those that it may be built of.
+    /// Adds a point, after those that it may be built from.
     Add(NewPoint),
-    /// One less.
+    /// Removes a point.
     TakeOut {
-        /// Which one.
+        /// Name of the point.
         name: String,
     },
-    /// Where the tool goes.
+    /// Selects the point that the tool goes to.
     Choose {
-        /// Which one; null: the part's own place.
+        /// Name of the point; null: the part's datum.
         name: Option<String>,
     },
 }
@@ -71,17 +71,17 @@ pub enum PointChange {
 #[derive(Clone, Debug, PartialEq, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct NewPoint {
-    /// By which later ones and the insertion name it.
+    /// The name by which later points and the insertion refer to it.
     pub name: String,
     /// midpoint, line, intersection, offset or lattice.
     pub kind: String,
-    /// Names of shapes, or of points before it.
+    /// Names of shapes, or of earlier points.
     pub of: Vec<String>,
-    /// Of an offset: the line or lattice that gives the direction.
+    /// For an offset: the line or lattice that gives the direction.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub along: Option<String>,
-    /// Of an offset: along and across, mm.
+    /// For an offset: distance along and across that direction, mm.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub by_mm: Option<[f64; 2]>,
@@ -90,13 +90,13 @@ pub struct NewPoint {
 /// A recipe's text after a change of its points.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct PointsChanged {
-    /// TOML, with all comments that it had.
+    /// TOML, with all its comments.
     pub text: String,
-    /// Its points now.
+    /// Its points after the change.
     pub points: Vec<RecipePoint>,
 }
 
-/// A recipe's text that is being written.
+/// The text of a recipe being edited.
 #[derive(Clone, Debug, PartialEq, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct PointsOf {
@@ -107,23 +107,23 @@ pub struct PointsOf {
 /// A point of a recipe.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct RecipePoint {
-    /// By which constructions and the insertion name it.
+    /// The name by which constructions and the insertion refer to it.
     pub name: String,
-    /// In the part's frame, as drawn, mm.
+    /// Position in the part's frame, as drawn, mm.
     pub at: [f64; 2],
-    /// shape, grid, or the construction's: midpoint, line, intersection, offset, lattice.
+    /// shape, grid, or the kind of construction: midpoint, line, intersection, offset, lattice.
     pub kind: String,
-    /// The tool goes there.
+    /// The tool goes to this point.
     pub chosen: bool,
 }
 
-/// What was read.
+/// What was read from a drawing.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct DrawingRead {
-    /// The recipe, stored.
+    /// The recipe, as stored.
     pub recipe: RecipeText,
-    /// Width and height of what was drawn, mm.
+    /// Width and height of the drawn part, mm.
     pub size_mm: [f64; 2],
-    /// What was passed over, and what to look at.
+    /// What was skipped in the drawing, and what to check.
     pub notes: Vec<String>,
 }

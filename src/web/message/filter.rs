@@ -1,41 +1,41 @@
-//! In: nothing. Out: what is taken away of a scan's surface before it is looked at, as pages say it.
+//! In: nothing. Out: filters that remove cells from a scan's surface before it is viewed, as pages state them.
 //! Frame and unit: the height map's grid frame, mm.
 
 use crate::scan;
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
 
-/// What is taken away; what stays is as it was measured.
+/// A filter. It removes cells; the remaining ones keep their measured values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TS)]
 #[serde(tag = "filter", rename_all = "snake_case")]
 pub enum Filter {
-    /// Cells whose stated standard deviation is larger.
+    /// Removes cells whose stated standard deviation is larger than this.
     Sigma {
-        /// mm.
+        /// Largest standard deviation, mm.
         most_mm: f64,
     },
-    /// Cells outside a range of heights.
+    /// Removes cells outside a range of heights.
     Heights {
-        /// mm.
+        /// Lowest height, mm.
         low_mm: f64,
-        /// mm.
+        /// Highest height, mm.
         high_mm: f64,
     },
-    /// What lies in a box.
+    /// Removes cells inside a box.
     Cut {
         /// Two opposite corners: x0 y0 x1 y1, mm.
         corners: [f64; 4],
     },
-    /// What lies outside a box.
+    /// Removes cells outside a box.
     Keep {
         /// Two opposite corners: x0 y0 x1 y1, mm.
         corners: [f64; 4],
     },
-    /// Pieces of surface of fewer cells.
+    /// Removes connected pieces of surface with too few cells.
     Islands {
-        /// Fewer than so many go.
+        /// Pieces with fewer cells are removed.
         least_cells: u32,
-        /// Neighbours that differ by more are of two pieces, mm.
+        /// Neighbouring cells whose heights differ by more belong to different pieces, mm.
         step_mm: f64,
     },
 }
@@ -52,31 +52,31 @@ impl From<Filter> for scan::Filter {
     }
 }
 
-/// The filters through which a scan is looked at; all questions about its surface are answered through them.
+/// The filters applied when a scan is viewed; all answers about its surface use them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct Filters {
-    /// In their order.
+    /// In the order in which they are applied.
     pub filters: Vec<Filter>,
 }
 
-/// What they leave.
+/// Result of the filters.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct Filtered {
-    /// In their order.
+    /// In the order in which they are applied.
     pub filters: Vec<Filter>,
-    /// Cells that each takes.
+    /// Number of cells that each filter removes.
     pub cells: Vec<usize>,
-    /// Cells that are left.
+    /// Number of cells that remain.
     pub left: usize,
 }
 
-/// A scan that is filtered for good.
+/// A filtered scan to be stored as a new scan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct FilterOrder {
-    /// The job that scanned.
+    /// The job that made the scan.
     pub scan: String,
-    /// In their order.
+    /// In the order in which they are applied.
     pub filters: Vec<Filter>,
 }

@@ -1,4 +1,4 @@
-//! In: nothing. Out: a job as pages and disk know it, and what is told of it while it runs.
+//! In: nothing. Out: a job as stored on disk and shown by pages, and the events sent while it runs.
 //! Frame and unit: times in UTC, RFC 3339.
 
 use super::{Bar, MotionState, Order, Outcome};
@@ -6,25 +6,25 @@ use crate::fault::{Fault, Kind};
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
 
-/// What became of a job.
+/// State of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, TS)]
 #[serde(rename_all = "snake_case")]
 pub enum JobState {
-    /// Waits for the one before it.
+    /// Waits for earlier jobs.
     Queued,
-    /// Runs now.
+    /// Is running.
     Running,
     /// Ended with a result.
     Done,
     /// Ended with a fault.
     Failed,
-    /// Ended by the operator; what was done is kept.
+    /// Ended by the operator; finished steps are stored.
     Stopped,
-    /// The program ended while it ran; it can be resumed or given up.
+    /// The program ended while it ran; it can be resumed or abandoned.
     CutOff,
 }
 
-/// What to do where the disk is full.
+/// What to do if the disk is full.
 const MAKE_ROOM: &str = "take old jobs away on the page Replay (the × behind each), or free space otherwise; then \
                          resume this job, or order it again";
 
@@ -33,7 +33,7 @@ const MAKE_ROOM: &str = "take old jobs away on the page Replay (the × behind ea
 pub struct Problem {
     /// usage, input, refused, output or device.
     pub kind: String,
-    /// What happened, with its number and limit.
+    /// What happened, with the value and the limit.
     pub what: String,
     /// Likely cause; may be empty.
     pub cause: String,
@@ -50,7 +50,7 @@ impl From<&Fault> for Problem {
             Kind::Output => "output",
             Kind::Device => "device",
         };
-        // Operators have no --out: they have jobs.
+        // Operators cannot pass --out; they have jobs.
         let next = if f.is_full_disk() { MAKE_ROOM } else { &f.next };
         Problem { kind: kind.into(), what: f.what.clone(), cause: f.cause.clone(), next: next.into() }
     }
@@ -62,47 +62,47 @@ impl From<&Fault> for Problem {
 pub struct Job {
     /// Version of job.json: 1.
     pub format: u32,
-    /// Name of its folder, e.g. `0007-scan`.
+    /// Name of the job's folder, e.g. `0007-scan`.
     pub id: String,
     /// What was ordered.
     pub order: Order,
-    /// What became of it.
+    /// State of the job.
     pub state: JobState,
     /// Steps done (shots, pictures, checks).
     pub done: usize,
-    /// Steps in all; null while nobody knows.
+    /// Steps in total; null while unknown.
     pub of: Option<usize>,
     /// When it was ordered.
     pub created: String,
-    /// Seconds that it ran.
+    /// Run time, s.
     pub seconds: f64,
     /// Why it failed.
     pub problem: Option<Problem>,
-    /// What came of it.
+    /// The result.
     pub outcome: Option<Outcome>,
-    /// Steps of an interrupted run are kept: resuming goes on there.
+    /// Steps of an interrupted run are stored: resuming continues from them.
     pub resumable: bool,
 }
 
-/// What a page hears over its WebSocket.
+/// An event sent over a page's WebSocket.
 #[derive(Clone, Debug, Serialize, TS)]
 #[serde(tag = "event", content = "data", rename_all = "snake_case")]
 pub enum Event {
-    /// First, and again after events were missed: everything as it stands.
+    /// Sent first, and again after events were missed: the complete state.
     State {
         /// The bar.
         bar: Bar,
         /// Newest first, at most 200.
         jobs: Vec<Job>,
-        /// The robot as it may be moved from here.
+        /// The robot's state for motions.
         motion: Box<MotionState>,
     },
-    /// Once a second, and when something in it changes.
+    /// Sent once a second, and when something in the bar changes.
     Bar(Bar),
     /// A job began, went on or ended.
     Job(Box<Job>),
-    /// Arming, what waits for a person, what a job says.
+    /// Arming, the motion that waits for confirmation, messages of a job.
     Motion(Box<MotionState>),
-    /// A job was taken away.
+    /// A job was removed.
     Gone(String),
 }

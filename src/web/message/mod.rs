@@ -1,6 +1,6 @@
-//! In: nothing. Out: what server and pages say to each other, one type a message; the pages' declarations are made
-//! from these.
-//! Frame and unit: lengths in mm, angles in degrees, times in UTC, RFC 3339; each name shows another unit.
+//! In: nothing. Out: the messages between server and pages, one type each; the pages' declarations are generated
+//! from them.
+//! Frame and unit: lengths in mm, angles in degrees, times in UTC, RFC 3339; names state any other unit.
 
 mod bar;
 mod camera;

@@ -1,97 +1,97 @@
-//! In: nothing. Out: what pages see of a robot that may be moved: who armed it, the motion that waits for a person,
-//! what was said.
+//! In: nothing. Out: the state of a robot that may be moved: which tab armed it, the motion that waits for
+//! confirmation, messages of the job.
 //! Frame and unit: base frame; mm, degrees as the labels say, mm/s, s.
 
 use super::GateLight;
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
 
-/// A motion that waits for a person, as it is shown.
+/// A motion that waits for confirmation, as it is shown.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct Asked {
-    /// The job that asks.
+    /// The job that proposes it.
     pub job: String,
     /// One or two words: touch, scan, approach, insert, retract, calibrate.
     pub step: String,
-    /// What was found, a sentence a line.
+    /// What was found, one sentence per line.
     pub says: Vec<String>,
     /// The question.
     pub question: String,
-    /// Names this motion and no other: poses, speed, reason and number.
+    /// Identifies this motion: poses, speed, reason and number.
     pub hash: String,
-    /// What it has to keep, all of it kept.
+    /// The gates that the motion must pass, all passed.
     pub gates: Vec<GateLight>,
-    /// Motions that are confirmed as one.
+    /// Number of motions that are confirmed together.
     pub motions: usize,
-    /// The fastest of them, mm/s.
+    /// Speed of the fastest of them, mm/s.
     pub speed_mm_s: f64,
-    /// How the flange's pose is written.
+    /// Convention in which the flange's pose is written.
     pub convention: String,
-    /// One a number, with its unit.
+    /// One label per number, with its unit.
     pub labels: Vec<String>,
-    /// Where the flange ends.
+    /// Final pose of the flange.
     pub numbers: Vec<f64>,
-    /// The button may stay down from the motion before to this one.
+    /// The button may stay pressed from the previous motion to this one.
     pub stays_down: bool,
-    /// It has to be confirmed within so long after it was shown, s.
+    /// Time within which it must be confirmed after it was shown, s.
     pub within_s: f64,
 }
 
-/// The simulated cell, where there is one.
+/// The simulated cell, if there is one.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct SimulatedCell {
-    /// Parts whose component the gripper can hold.
+    /// Parts that have a component for the gripper.
     pub parts: Vec<String>,
-    /// Whose it holds.
+    /// The part whose component the gripper holds.
     pub holds: String,
-    /// The arm stands over the part, or over the calibration board.
+    /// True: the arm is over the calibration board; false: over the part.
     pub over_board: bool,
 }
 
-/// The robot as it may be moved from here.
+/// The robot's state for motions.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, TS)]
 pub struct MotionState {
-    /// A robot was named.
+    /// A robot is configured.
     pub robot: bool,
-    /// The program was started with leave to move it.
+    /// The program was started with permission to move it.
     pub may_move: bool,
-    /// A short name of the tab that armed it; null: it is not armed.
+    /// A short name of the tab that armed the robot; null: it is not armed.
     pub armed: Option<String>,
     /// A confirmed motion is under way.
     pub moving: bool,
-    /// Why somebody has to look at the robot first; null: nobody has to.
+    /// Why a person must look at the robot first; null: nobody must.
     pub look: Option<String>,
-    /// The job that moves it, or the last one that did.
+    /// The job that moves the robot, or the last one that did.
     pub job: Option<String>,
-    /// What waits for a person.
+    /// The motion that waits for confirmation.
     pub asked: Option<Asked>,
-    /// What the job said so far.
+    /// Messages of the job so far.
     pub said: Vec<String>,
-    /// While the last motion was made: the longest that nothing was heard of the held button, ms; null: none was made.
+    /// Longest silence of the held button during the last motion, ms; null: there was no motion.
     pub silence_ms: Option<f64>,
-    /// Of a calibration: stops so far, expected error then, mm.
+    /// For a calibration: number of stops, and the error expected after them, mm.
     pub expected: Vec<(usize, f64)>,
-    /// Null: the robot is none of ours.
+    /// Null if the robot is not the simulated one.
     pub simulated: Option<SimulatedCell>,
 }
 
-/// Arms, or gives the arm back.
+/// Arms or disarms the robot.
 #[derive(Clone, Copy, Debug, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct Arming {
-    /// False: gives it back.
+    /// False: disarms it.
     pub armed: bool,
 }
 
-/// What a person does in the simulated cell.
+/// An action of a person in the simulated cell.
 #[derive(Clone, Debug, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct InTheCell {
-    /// Puts the component that belongs to this part into the gripper; null: what it holds stays.
+    /// Puts the component of this part into the gripper; null: the gripper keeps its component.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub holds: Option<String>,
-    /// Jogs the arm over the calibration board, else over the part.
+    /// Jogs the arm over the calibration board; false: over the part.
     #[serde(default)]
     pub over_board: bool,
 }

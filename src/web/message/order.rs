@@ -1,64 +1,66 @@
-//! In: nothing. Out: what an operator can order, as the API takes it and job.json keeps it.
-//! Frame and unit: mm, degrees; places in a height map's grid.
+//! In: nothing. Out: what an operator can order, as sent to the API and stored in job.json.
+//! Frame and unit: mm, degrees; positions in a height map's grid.
 
 use super::FilterOrder;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use ts_rs::TS;
 
-/// A procedure with what it needs. Recordings by their path below the recordings' folder, scans by their job.
+/// A procedure with its inputs. Recordings are named by their path below the recordings' folder, scans by their
+/// job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 #[serde(tag = "procedure", rename_all = "snake_case")]
 pub enum Order {
-    /// Station, disk and adapters; every stage of the GPU against its twin.
+    /// Checks station, disk and adapters, and every GPU stage against its CPU twin.
     Check(Plain),
-    /// A recording to cloud and height map.
+    /// Makes a cloud and a height map from a recording.
     Scan(ScanOrder),
-    /// A finished scan less what filters take away, as a scan of its own.
+    /// Stores a filtered copy of a finished scan.
     Filter(FilterOrder),
-    /// A recipe's part in finished scans: several are looks at the same part.
+    /// Finds a recipe's part in finished scans; several scans are views of the same part.
     Find(FindOrder),
-    /// A recipe from a finished scan.
+    /// Makes a recipe from a finished scan.
     Teach(TeachOrder),
-    /// The pointer's spots on a surface: distances, plane, normal.
+    /// Measures the pointer's spots on a surface: distances, plane, normal.
     Touch(TouchOrder),
-    /// The exposure that suits the stripe in the camera's picture; it stays set.
+    /// Finds the exposure that suits the stripe in the camera's picture, and sets it.
     Tune(Plain),
-    /// A calibration from a recording; it is stored when it is accepted.
+    /// Calibrates from one recording; the result is stored in the station when it is accepted.
     Calibrate(CalibrateOrder),
-    /// Camera, hand-eye, laser plane and pointer from any recordings of boards, in one solve; stored when it is
-    /// accepted.
+    /// Calibrates camera, hand-eye, laser plane and pointer in one solve from any recordings of boards; stored in
+    /// the station when accepted.
     Joint(JointOrder),
-    /// The same by moves of the robot that the program chooses.
+    /// The same with motions of the robot that the program chooses.
     Auto(AutoOrder),
-    /// A part with the robot: touch, square, scan, find, approach, insert, retract.
+    /// Inserts a component with the robot: touch, square, scan, find, approach, insert, retract.
     Insert(InsertOrder),
-    /// The time of a shot on this machine, with and without its GPU; what is dropped of a camera.
+    /// Measures the time of a shot on this machine, with and without its GPU, and the pictures of a camera that are
+    /// dropped.
     Benchmark(BenchmarkOrder),
 }
 
-/// Nothing is to be said.
+/// No further input.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct Plain {}
 
-/// What is measured of this machine.
+/// Inputs of the benchmark.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct BenchmarkOrder {
-    /// Pictures a second of the camera whose drops are counted; null: 30.
+    /// Frame rate of the camera whose drops are counted, Hz; null: 30.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub rate_hz: Option<f64>,
 }
 
-/// Which recording is scanned, and how.
+/// The recording to scan, and the settings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct ScanOrder {
-    /// Which one.
+    /// Path of the recording.
     pub recording: String,
-    /// Edge of a cell, mm; null: what the points bear.
+    /// Cell size of the map, mm; null: chosen from the points' density.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub cell_mm: Option<f64>,
@@ -66,16 +68,16 @@ pub struct ScanOrder {
     #[serde(default)]
     #[ts(optional = nullable)]
     pub on: Option<String>,
-    /// Leave out shots that cannot be read.
+    /// Skip shots that cannot be read.
     #[serde(default)]
     pub skip_bad: bool,
-    /// Settings other than the station's: keys of [extraction] in station.toml, with dots, and their values.
+    /// Settings that differ from the station's: dotted keys of [extraction] in station.toml, and their values.
     #[serde(default)]
     #[ts(type = "Record<string, unknown>")]
     pub settings: BTreeMap<String, serde_json::Value>,
 }
 
-/// What is looked for, and where.
+/// What to find, and in which scans.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct FindOrder {
@@ -83,35 +85,35 @@ pub struct FindOrder {
     pub scans: Vec<String>,
     /// Name of the recipe.
     pub recipe: String,
-    /// Two places in the first scan's map, mm: the tool goes where the middle of the pins there says; null: where the
-    /// recipe says.
+    /// Two positions in the first scan's map, mm: the tool goes to the middle of the pins there; null: to the point
+    /// that the recipe names.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub pins: Option<[[f64; 2]; 2]>,
 }
 
-/// What was touched.
+/// The recording of a touched surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct TouchOrder {
-    /// Which recording of the pointer.
+    /// Path of the recording of the pointer.
     pub recording: String,
 }
 
-/// What is calibrated, from what.
+/// What to calibrate, and from which recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct CalibrateOrder {
-    /// What.
+    /// What to calibrate.
     pub target: Target,
-    /// From which recording.
+    /// Path of the recording.
     pub recording: String,
-    /// Frames to leave out, from 0.
+    /// Frames to exclude, counted from 0.
     #[serde(default)]
     pub leave_out: Vec<usize>,
 }
 
-/// What is calibrated together.
+/// The recordings for a joint calibration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct JointOrder {
@@ -119,15 +121,15 @@ pub struct JointOrder {
     pub recordings: Vec<String>,
 }
 
-/// A calibration that drives itself.
+/// A calibration that moves the robot itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct AutoOrder {
-    /// Name of the board's description in the station's folder boards.
+    /// Name of the board's description in the station's folder `boards`.
     pub board: String,
-    /// Expected error of a scanned point at which it is enough, mm rms.
+    /// The calibration ends when the expected error of a scanned point is at most this, mm rms.
     pub target_mm: f64,
-    /// Stops at most, 20 to 200; null: 40.
+    /// Most stops, 20 to 200; null: 40.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub most: Option<usize>,
@@ -139,7 +141,7 @@ pub struct AutoOrder {
 pub struct InsertOrder {
     /// Name of the recipe.
     pub recipe: String,
-    /// The line sweeps over so much about the picture's middle, mm; null: the field's short side.
+    /// Length of the sweep about the picture's middle, mm; null: the field's short side.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub sweep_mm: Option<f64>,
@@ -147,59 +149,59 @@ pub struct InsertOrder {
     #[serde(default)]
     #[ts(optional = nullable)]
     pub speed_mm_s: Option<f64>,
-    /// Where it was cut off it goes back up instead of on.
+    /// After an interruption, retract instead of continuing.
     #[serde(default)]
     pub back_out: bool,
 }
 
-/// What is calibrated.
+/// Target of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, TS)]
 #[serde(rename_all = "snake_case")]
 pub enum Target {
     /// Camera and lens.
     Camera,
-    /// The camera on the flange.
+    /// Pose of the camera on the flange.
     HandEye,
-    /// The sheet of light.
+    /// The laser plane.
     LaserPlane,
     /// The pointer's beam.
     Pointer,
-    /// A linear axis or turntable that moves parts before a camera that stands still.
+    /// A linear axis or turntable that moves parts in front of a fixed camera.
     Axis,
 }
 
-/// A part, by a few places in a height map.
+/// A part taught by a few positions in a height map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct TeachOrder {
     /// The job that scanned it.
     pub scan: String,
-    /// What the recipe is called.
+    /// Name of the recipe.
     pub name: String,
-    /// Corners of the body before it is turned: x0 y0 x1 y1, mm in the grid.
+    /// Corners of the body before its rotation: x0 y0 x1 y1, mm in the grid.
     pub outline: [f64; 4],
-    /// Its turn about its centre, degrees.
+    /// Its rotation about its centre, degrees.
     #[serde(default)]
     pub angle_deg: f64,
-    /// Windows in the body, corners as above.
+    /// Windows in the body, corners as for `outline`.
     #[serde(default)]
     pub windows: Vec<[f64; 4]>,
     /// Round holes: x, y, radius.
     #[serde(default)]
     pub holes: Vec<[f64; 3]>,
-    /// What the insertion bears in the plane, mm.
+    /// Tolerance of the insertion in the plane, mm.
     pub tolerance_mm: f64,
-    /// What it bears as a turn, degrees.
+    /// Tolerance of its rotation, degrees.
     pub tolerance_deg: f64,
-    /// The tool's way above the insertion pose before and after, mm.
+    /// Distance of the tool above the insertion pose before and after the insertion, mm.
     pub approach_mm: f64,
-    /// It takes the place of the station's own recipe of that name.
+    /// Replaces the station's recipe of that name.
     #[serde(default)]
     pub replace: bool,
 }
 
 impl Order {
-    /// The word that folders and pages call it by.
+    /// The name of the procedure in folders and pages.
     pub fn word(&self) -> &'static str {
         match self {
             Order::Check(_) => "check",

@@ -1,4 +1,4 @@
-//! In: nothing. Out: what each procedure came to, as pages show it and job.json keeps it.
+//! In: nothing. Out: the result of each procedure, as shown by pages and stored in job.json.
 //! Frame and unit: mm, degrees, px; poses in the scan's frame.
 
 use super::ExposureSet;
@@ -6,46 +6,46 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use ts_rs::TS;
 
-/// What came of a job.
+/// Result of a job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 #[serde(tag = "procedure", rename_all = "snake_case")]
 pub enum Outcome {
-    /// One line a check.
+    /// Results of the checks.
     Check {
-        /// In the order in which they were made.
+        /// In the order of the checks.
         lines: Vec<CheckLine>,
     },
-    /// The scan's figures; its files lie in the job.
+    /// Figures of the scan; its files are in the job's folder.
     Scan(Box<ScanFigures>),
-    /// Where the tool goes, or why not.
+    /// The tool's poses, or why there are none.
     Find(Box<Position>),
-    /// The recipe and its proof on the scan that it was taught from.
+    /// The recipe, and a test on the scan that it was taught from.
     Teach {
         /// Name of the recipe.
         recipe: String,
-        /// Found on its own scan.
+        /// Result of finding the part in that scan.
         proof: Box<Position>,
     },
     /// The surface that the pointer touched.
     Touch(Box<Touched>),
     /// The exposure that was set.
     Tune(Box<ExposureSet>),
-    /// A calibration to be accepted.
+    /// A calibration, to be accepted.
     Calibrate(Box<CalibrationFigures>),
     /// All calibrations of a rig together, to be accepted.
     Joint(Box<CalibrationFigures>),
-    /// The same by moves of the robot.
+    /// The same with motions of the robot.
     Auto(Box<CalibrationFigures>),
-    /// The component is in.
+    /// The component is inserted.
     Insert(Box<Inserted>),
-    /// Times of a shot.
+    /// Times per shot.
     Benchmark {
-        /// One a size and processor.
+        /// One row per size and processor.
         rows: Vec<BenchRow>,
-        /// The same of other machines, as they were recorded.
+        /// Recorded rows of other machines.
         #[serde(default)]
         recorded: Vec<BenchRow>,
-        /// What of a camera was measured and what was dropped, at half and at full resolution.
+        /// Measured and dropped pictures of a camera, at half and at full resolution.
         #[serde(default)]
         kept_up: Vec<KeptUp>,
     },
@@ -56,92 +56,92 @@ pub enum Outcome {
 pub struct CheckLine {
     /// station, camera, robot, gpu, disk or clock.
     pub group: String,
-    /// What was looked at.
+    /// What was checked.
     pub name: String,
-    /// good, poor (works, but read it), bad or absent.
+    /// good, poor (works, but read the finding), bad or absent.
     pub state: String,
-    /// What was seen, with its number and limit.
+    /// The finding, with the value and the limit.
     pub says: String,
 }
 
-/// What a scan came to; scan.json holds more.
+/// Figures of a scan; scan.json has more.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct ScanFigures {
-    /// Shots done, those left out included.
+    /// Shots processed, skipped ones included.
     pub shots: usize,
-    /// Points of the cloud.
+    /// Number of points in the cloud.
     #[ts(type = "number")]
     pub points: u64,
-    /// Size of the pictures, px.
+    /// Columns of the pictures, px.
     pub width: u32,
     /// Rows, px.
     pub height: u32,
     /// Frame of the cloud: base, axis or flange.
     pub frame: String,
-    /// Median of the points' own standard deviations, mm.
+    /// Median of the points' standard deviations, mm.
     pub median_sigma_mm: Option<f64>,
-    /// Share of the map's cells that were measured.
+    /// Fraction of the map's cells that were measured.
     pub coverage: Option<f64>,
-    /// Edge of a cell, mm.
+    /// Cell size, mm.
     pub cell_mm: Option<f64>,
-    /// Heights between which 98 % of the map lies, mm.
+    /// Range that contains 98 % of the map's heights, mm.
     pub z_mm: Option<[f64; 2]>,
-    /// Peaks by fate.
+    /// Number of peaks by `fate`: kept, or the reason for rejection.
     #[ts(type = "Record<string, number>")]
     pub peaks: BTreeMap<String, u64>,
-    /// Shots without a point.
+    /// Number of shots without a point.
     pub dark_shots: usize,
-    /// Shots left out: name and reason.
+    /// Skipped shots: name and reason.
     pub skipped: Vec<(String, String)>,
-    /// From the first shot to the closed cloud, s.
+    /// Time from the first shot to the finished cloud, s.
     pub seconds: f64,
-    /// Shots a second of this run.
+    /// Shots per second of this run.
     pub shots_per_second: f64,
-    /// Adapter, or this machine's processor and why.
+    /// The adapter; or this machine's processor, and why.
     pub ran_on: String,
-    /// Seconds by what the main thread did.
+    /// Seconds by activity of the main thread.
     #[ts(type = "Record<string, number>")]
     pub spent: BTreeMap<String, f64>,
     /// What a reader must know.
     pub remarks: Vec<String>,
 }
 
-/// Where the tool goes.
+/// The tool's poses for an insertion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct Position {
     /// Name of the recipe.
     pub recipe: String,
     /// Frame of the poses.
     pub frame: String,
-    /// Every gate was passed.
+    /// Every gate passed.
     pub passed: bool,
-    /// Which were not, in words.
+    /// The gates that failed, in words.
     pub reasons: Vec<String>,
-    /// Null where a gate was missed.
+    /// Null if a gate failed.
     pub poses: Option<RobotPoses>,
-    /// One standard deviation along x, y, z of the part, mm.
+    /// Standard deviation along x, y, z of the part, mm.
     pub sigma_mm: [f64; 3],
-    /// One standard deviation of the turns about them, degrees.
+    /// Standard deviation of the rotation about these axes, degrees.
     pub sigma_deg: [f64; 3],
-    /// What the insertion bears in the plane, mm.
+    /// Tolerance of the insertion in the plane, mm.
     pub tolerance_mm: f64,
-    /// What it bears as a turn, degrees.
+    /// Tolerance of its rotation, degrees.
     pub tolerance_deg: f64,
-    /// 3 sigma within both.
+    /// 3 sigma lie within both tolerances.
     pub within_tolerance: bool,
-    /// Where the sigma comes from.
+    /// Contributions to the standard deviation.
     pub terms: Vec<Term>,
-    /// False: a term is unknown, the sum is a lower bound.
+    /// False: a contribution is unknown, so the sum is a lower bound.
     pub complete: bool,
-    /// Each gate with its number and limit.
+    /// Each gate with its value and limit.
     pub gates: Vec<GateLight>,
-    /// Score of the match, and of the next best.
+    /// Score of the match.
     pub score: f64,
-    /// Of the next best pose.
+    /// Score of the next best pose.
     pub second_score: f64,
-    /// The part in the scan's frame: row-major 4x4, mm.
+    /// Pose of the part in the scan's frame: row-major 4x4, mm.
     pub part: [f64; 16],
-    /// The drawing's outlines in the height map's grid, mm.
+    /// Outlines of the drawing in the height map's grid, mm.
     pub outline: Vec<Vec<[f64; 2]>>,
     /// What else a reader must know.
     pub notes: Vec<String>,
@@ -150,56 +150,56 @@ pub struct Position {
 /// The poses of one insertion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct RobotPoses {
-    /// Changes with every number here: a confirmation names the poses that were shown by it.
+    /// Hash of all numbers here: a confirmation identifies the shown poses by it.
     pub hash: String,
-    /// The station's own notation.
+    /// The station's pose convention.
     pub convention: String,
-    /// One a number, with its unit.
+    /// One label per number, with its unit.
     pub labels: Vec<String>,
     /// Above the insertion.
     pub approach: Vec<f64>,
-    /// The tool at its place.
+    /// The inserted tool.
     pub insertion: Vec<f64>,
-    /// Above it, on the way back.
+    /// Above the insertion, on the way back.
     pub retract: Vec<f64>,
-    /// The insertion in every notation.
+    /// The insertion pose in every convention.
     pub notations: Vec<Notation>,
 }
 
-/// A pose as one vendor writes it.
+/// A pose in one vendor's convention.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct Notation {
     /// Name of the convention.
     pub name: String,
-    /// One a number, with its unit.
+    /// One label per number, with its unit.
     pub labels: Vec<String>,
     /// In the order of the labels.
     pub numbers: Vec<f64>,
 }
 
-/// A source of uncertainty.
+/// A contribution to the uncertainty.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct Term {
-    /// Its name.
+    /// Name of the contribution.
     pub name: String,
-    /// Along x, y, z of the part, mm; null where it is not known.
+    /// Standard deviation along x, y, z of the part, mm; null if unknown.
     pub sigma_mm: Option<[f64; 3]>,
-    /// About them, degrees.
+    /// Standard deviation about these axes, degrees.
     pub sigma_deg: Option<[f64; 3]>,
-    /// What it is.
+    /// Explanation.
     pub note: String,
 }
 
-/// A gate as a light.
+/// A gate and its result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct GateLight {
-    /// What is judged, with its unit.
+    /// The judged quantity, with its unit.
     pub name: String,
-    /// What was seen.
+    /// The measured value.
     pub value: f64,
-    /// What it is held against.
+    /// The limit.
     pub limit: f64,
-    /// Kept.
+    /// The value keeps the limit.
     pub passed: bool,
 }
 
@@ -209,46 +209,46 @@ impl From<&crate::fault::Gate> for GateLight {
     }
 }
 
-/// An insertion that came to its end.
+/// A completed insertion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct Inserted {
-    /// From the beginning to the confirmed position, s.
+    /// Time from the start to the confirmed position, s.
     pub time_to_position_s: Option<f64>,
-    /// Motions that were confirmed until then.
+    /// Number of confirmations until then.
     pub confirmations_to_position: Option<u32>,
-    /// Work and waits, s.
+    /// Total duration, work and waiting, s.
     pub seconds: f64,
-    /// Motions that were confirmed.
+    /// Number of confirmations in total.
     pub confirmations: u32,
-    /// Where the part was found; null where it was found before the program was started again.
+    /// The found part; null if it was found before the program was restarted.
     pub found: Option<Position>,
 }
 
-/// A pose in which the tool stands square to what was touched, at the place where it stood at the last shot.
+/// A pose in which the tool is square to the touched surface, at its position in the last shot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct SquareProposed {
-    /// How far the tool leant at the last shot, degrees.
+    /// Tilt of the tool in the last shot, degrees.
     pub tilt_deg: f64,
-    /// One standard deviation of that.
+    /// Standard deviation of the tilt, degrees.
     pub tilt_sigma_deg: f64,
-    /// How the robot writes poses.
+    /// The robot's pose convention.
     pub convention: String,
-    /// Names of the numbers.
+    /// Labels of the numbers.
     pub labels: Vec<String>,
-    /// Where the flange goes, base frame.
+    /// Pose of the flange, base frame.
     pub flange: Vec<f64>,
-    /// Where the tool is then, base frame.
+    /// Pose of the tool then, base frame.
     pub tool: Vec<f64>,
 }
 
-/// What the pointer touched.
+/// The touched surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct Touched {
-    /// Picture, distance from the camera along its axis and its standard deviation, mm.
+    /// For each spot: picture, distance from the camera along its axis and its standard deviation, mm.
     pub spots: Vec<(String, f64, f64)>,
-    /// The plane through them.
+    /// The plane through the spots.
     pub surface: Option<SurfaceTouched>,
-    /// How to stand square to it; null without a surface or without the station's tool.
+    /// How to make the tool square to the plane; null without a plane or without the station's tool.
     #[serde(default)]
     pub square: Option<SquareProposed>,
     /// Pictures without a distance: name and reason.
@@ -257,113 +257,113 @@ pub struct Touched {
     pub remarks: Vec<String>,
 }
 
-/// A plane that was touched.
+/// A plane through touched spots.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct SurfaceTouched {
-    /// Unit length, towards the camera; base frame.
+    /// Unit normal towards the camera; base frame.
     pub normal: [f64; 3],
     /// Middle of the spots, base frame, mm.
     pub centre_mm: [f64; 3],
-    /// Standard deviation of its tilt: worst direction, and across it, degrees.
+    /// Standard deviation of its tilt: in the worst direction, and at right angles to it, degrees.
     pub tilt_sigma_deg: [f64; 2],
-    /// How far the spots lie off it, rms, mm.
+    /// Distance of the spots from the plane, rms, mm.
     pub rms_mm: f64,
-    /// Angle between it and the base's z, degrees.
+    /// Angle between its normal and the base's z axis, degrees.
     pub tilt_deg: f64,
-    /// A spot that does not lie on the plane of the others.
+    /// A spot that was excluded because it does not lie on the plane of the others.
     pub left_out: Option<String>,
 }
 
-/// What a calibration came to.
+/// Figures of a calibration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct CalibrationFigures {
-    /// What was calibrated, as files call it.
+    /// Kind of calibration, as named in files.
     pub kind: String,
     /// good, usable, badly determined or refused.
     pub verdict: String,
-    /// Why.
+    /// Reasons for the verdict.
     pub reasons: Vec<String>,
-    /// The next best picture.
+    /// Advice for the next picture.
     pub advice: Vec<String>,
-    /// Named figures, unit in the name.
+    /// Figures by name, with the unit in the name.
     #[ts(type = "Record<string, number>")]
     pub figures: BTreeMap<String, f64>,
-    /// The same of the station's present one; empty without.
+    /// The same figures of the station's present calibration; empty if there is none.
     #[ts(type = "Record<string, number>")]
     pub former: BTreeMap<String, f64>,
-    /// Residual a picture; unit in the heading of the page.
+    /// Residual of each picture; the page's heading states the unit.
     pub per_picture: Vec<(String, f64)>,
-    /// Pictures that were not used: name and reason.
+    /// Excluded pictures: name and reason.
     pub left_out: Vec<(String, String)>,
     /// It was stored in the station.
     pub accepted: bool,
 }
 
-/// What became of a camera's pictures while the newest one was measured again and again.
+/// Fates of a camera's pictures while the newest one was measured repeatedly.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct KeptUp {
-    /// What it ran on.
+    /// Adapter or processor.
     pub on: String,
     /// Columns, px.
     pub width: u32,
     /// Rows, px.
     pub height: u32,
-    /// Pictures a second that were sent.
+    /// Frame rate at which pictures were sent, Hz.
     pub rate_hz: f64,
-    /// Pictures that were sent.
+    /// Number of pictures sent.
     #[ts(type = "number")]
     pub sent: u64,
-    /// Of these with points.
+    /// Number of these that have points.
     #[ts(type = "number")]
     pub measured: u64,
-    /// Passed over, because a newer one had come.
+    /// Skipped because a newer one had arrived.
     #[ts(type = "number")]
     pub passed_over: u64,
-    /// Lost otherwise.
+    /// Lost for other reasons.
     #[ts(type = "number")]
     pub lost: u64,
-    /// From the last byte to the points, p50 and p99, ms.
+    /// Time from the last byte to the points, p50 and p99, ms.
     pub ms: [f64; 2],
 }
 
-/// Jobs that found one part again and again.
+/// Jobs that found the same part repeatedly.
 #[derive(Clone, Debug, PartialEq, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct RepeatsAsk {
-    /// Their names.
+    /// Names of the jobs.
     pub jobs: Vec<String>,
 }
 
-/// How places of one part repeat.
+/// Repeatability of a part's pose.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct Repeats {
-    /// Of how many.
+    /// Number of poses.
     pub places: usize,
-    /// x, y, z, turn; empty of fewer than two.
+    /// For x, y, z and rotation; empty for fewer than two poses.
     pub along: Vec<Spread>,
 }
 
-/// How they repeat along one axis, or in the turn.
+/// Repeatability along one axis, or of the rotation.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct Spread {
     /// x, y, z of the frame, or turn.
     pub name: String,
     /// mm or degrees.
     pub unit: String,
-    /// One standard deviation of the places.
+    /// Standard deviation of the poses.
     pub scatter: f64,
-    /// What they state of themselves, root mean square.
+    /// Root mean square of the standard deviations that the poses state.
     pub stated: f64,
-    /// From the first to the last of them.
+    /// Range from the lowest to the highest value.
     pub apart: f64,
-    /// The histogram reaches so far to both sides of the median.
+    /// Half width of the histogram, centred on the median.
     pub half: f64,
-    /// Places in each of its bars.
+    /// Number of poses in each bar of the histogram.
     pub bars: Vec<u32>,
 }
 
 impl Repeats {
-    /// As pages show them.
+    /// The message that pages show.
     pub fn of(places: usize, found: Option<crate::station::Repeats>) -> Repeats {
         let spread = |s: crate::station::Spread| Spread {
             name: s.name.into(),
@@ -378,15 +378,15 @@ impl Repeats {
     }
 }
 
-/// The time of a shot.
+/// Time per shot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct BenchRow {
-    /// What it ran on.
+    /// Adapter or processor.
     pub on: String,
     /// Columns, px.
     pub width: u32,
     /// Rows, px.
     pub height: u32,
-    /// Of the whole chain, ms.
+    /// Time of the whole chain, ms.
     pub ms_per_shot: f64,
 }

@@ -10,49 +10,49 @@ use ts_rs::TS;
 pub struct StationInfo {
     /// Its name.
     pub name: String,
-    /// Where pictures come from.
+    /// Source of the pictures.
     pub mode: Mode,
     /// Name and version of the program.
     pub program: String,
-    /// How its robot writes poses; null: as matrices.
+    /// The robot's pose convention; null: poses are written as matrices.
     pub robot: Option<String>,
     /// eye-in-hand or eye-to-hand; null: not stated.
     pub mount: Option<String>,
-    /// What the work tolerates, mm.
+    /// Tolerance of the work, mm.
     pub tolerance_mm: Option<f64>,
-    /// Camera depths at which points are believed, mm.
+    /// Range of camera depths in which points are accepted, mm.
     pub volume_mm: Option<[f64; 2]>,
-    /// Frame of scans and of the poses that are found in them: base, axis or camera.
+    /// Frame of scans and of poses found in them: base, axis or camera.
     pub work_frame: String,
-    /// Frames that are fixed to others, in the robot's notation.
+    /// Fixed frames relative to others, in the robot's convention.
     pub frames: Vec<FrameInfo>,
-    /// One a calibration that there is.
+    /// One entry per existing calibration.
     pub calibrations: Vec<CalibrationState>,
-    /// What is wrong with it; null: nothing.
+    /// What is wrong with the station; null: nothing.
     pub problem: Option<Problem>,
-    /// Names of all settings of the extraction, with dots, and the station's values.
+    /// Dotted names of all extraction settings, with the station's values.
     #[ts(type = "Record<string, unknown>")]
     pub extraction: std::collections::BTreeMap<String, serde_json::Value>,
 }
 
-/// Where a frame is.
+/// Pose of a frame.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct FrameInfo {
     /// tool or camera.
     pub name: String,
-    /// flange or base.
+    /// The frame it is relative to: flange or base.
     pub on: String,
-    /// Names of the numbers.
+    /// Labels of the numbers.
     pub labels: Vec<String>,
-    /// mm, degrees or as the notation has them.
+    /// mm, degrees, or units of the convention.
     pub numbers: Vec<f64>,
 }
 
-/// Whether the support file has pictures.
+/// Whether the support file includes pictures.
 #[derive(Clone, Debug, PartialEq, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct SupportAsk {
-    /// Somebody ticked it.
+    /// A person ticked the option.
     #[serde(default)]
     pub pictures: bool,
 }
@@ -60,15 +60,15 @@ pub struct SupportAsk {
 /// A calibration of the station.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct CalibrationState {
-    /// As files call it.
+    /// Name in files.
     pub kind: String,
-    /// For people.
+    /// Name for people.
     pub words: String,
     /// good, usable, badly determined or refused.
     pub verdict: String,
     /// When it was measured.
     pub created: String,
-    /// How long ago, days.
+    /// Its age, days.
     pub days: f64,
     /// Expected error of a point at the working distance, mm.
     pub expected_mm: Option<f64>,
@@ -79,17 +79,17 @@ pub struct CalibrationState {
 pub struct RecordingInfo {
     /// Path below the recordings' folder.
     pub name: String,
-    /// What it calls itself.
+    /// The name stated in its meta.json.
     pub set: String,
-    /// Moments in it.
+    /// Number of frames.
     pub frames: usize,
-    /// Size of its pictures, px.
+    /// Columns of its pictures, px.
     pub width: u32,
     /// Rows, px.
     pub height: u32,
-    /// line, pointer; null where no laser is on.
+    /// line or pointer; null if no laser is on.
     pub beam: Option<String>,
-    /// It shows a board.
+    /// It shows a calibration board.
     pub board: bool,
     /// robot, linear or turntable.
     pub motion: String,
@@ -100,46 +100,46 @@ pub struct RecordingInfo {
 /// A picture of a calibration board.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct BoardView {
-    /// What it is called.
+    /// Name of the picture.
     pub name: String,
-    /// Its file, in the job.
+    /// Its file in the job's folder.
     pub file: String,
     /// Columns, px.
     pub width: u32,
     /// Rows, px.
     pub height: u32,
-    /// The corners that were found, u and v, px.
+    /// The detected corners, u and v, px.
     pub corners: Vec<[f64; 2]>,
-    /// How far the board's normal leans away from the camera's axis, to the right and downwards in the picture,
-    /// degrees, by the station's camera or else one as long as its picture is wide; null where too little of the
+    /// Tilt of the board's normal from the camera's axis, to the right and downwards in the picture, degrees. Uses
+    /// the station's camera, or else a focal length equal to the picture's width in px. Null if too little of the
     /// board was found.
     pub lean_deg: Option<[f64; 2]>,
-    /// Where the axis stood that the board rides on, counts; null without one, or where it is not known.
+    /// Position of the axis that carries the board, counts; null without an axis, or if unknown.
     pub count: Option<f64>,
 }
 
-/// Which picture of a recording of boards.
+/// A picture of a recording of boards.
 #[derive(Clone, Debug, PartialEq, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct ViewRef {
     /// The recording.
     pub recording: String,
-    /// Its frame, from 0.
+    /// Frame number, counted from 0.
     pub frame: usize,
 }
 
-/// Which picture of a recording.
+/// A picture of a recording.
 #[derive(Clone, Debug, PartialEq, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct PictureRef {
     /// The recording.
     pub recording: String,
-    /// Its frame, from 0.
+    /// Frame number, counted from 0.
     pub frame: usize,
-    /// laser or ambient; without: whichever there is.
+    /// laser or ambient; null: whichever exists.
     #[serde(default)]
     pub light: Option<String>,
-    /// Columns of the answer, 16 to 4096; without: the picture's own.
+    /// Columns of the answer, 16 to 4096; null: as the picture.
     #[serde(default)]
     pub width: Option<u32>,
 }
@@ -149,22 +149,22 @@ pub struct PictureRef {
 pub struct RecipeText {
     /// Name of the file, without extension.
     pub name: String,
-    /// What people call the part; read from the text.
+    /// Name of the part for people; read from the text.
     pub title: String,
-    /// Ships with the program; it is copied when it is changed.
+    /// The recipe ships with the program; it is copied when it is changed.
     pub shipped: bool,
-    /// TOML; empty where it cannot be read at all.
+    /// TOML; empty if the file cannot be read at all.
     pub text: String,
     /// What is wrong with it; null: nothing.
     pub problem: Option<Problem>,
 }
 
-/// A recipe to be stored. Keys of a listed recipe beside the text may be sent along and are not read.
+/// A recipe to be stored. Other keys of a listed recipe may be sent too; they are ignored.
 #[derive(Clone, Debug, PartialEq, Deserialize, TS)]
 pub struct RecipeAsk {
     /// TOML.
     pub text: String,
-    /// It takes the place of the station's own recipe of that name.
+    /// Replaces the station's recipe of that name.
     #[serde(default)]
     pub replace: bool,
 }

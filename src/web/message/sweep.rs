@@ -1,108 +1,108 @@
-//! In: nothing. Out: the way of the line over a part before it is scanned, and which speed, step and pictures a
-//! second go together.
-//! Frame and unit: the board as the camera sees it squarely, from the foot of its axis (x right, y down), mm; mm/s;
-//! pictures a second.
+//! In: nothing. Out: the path of the laser line over a part before it is scanned, and matching values of speed,
+//! step and frame rate.
+//! Frame and unit: the board as a square-on camera sees it, from the foot of the camera's axis (x right, y down),
+//! mm; mm/s; frame rates in Hz.
 
 use crate::robot::Convention;
 use crate::station::job::{Pace as Paced, Preview};
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
 
-/// Which sweep; what is left open is the station's own.
+/// The sweep to plan; omitted values are the station's.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct SweepAsk {
     /// Name of the recipe.
     pub recipe: String,
-    /// An insertion that touched the board already.
+    /// Name of an insertion job that has already touched the board.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub job: Option<String>,
-    /// From the camera to the board, mm, before it was touched.
+    /// Distance from the camera to the board, mm, before it was touched.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub distance_mm: Option<f64>,
-    /// Length, mm.
+    /// Length of the sweep, mm.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub sweep_mm: Option<f64>,
-    /// From one shot to the next, mm.
+    /// Distance between shots, mm.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub step_mm: Option<f64>,
-    /// mm/s; without: the fastest that all bear.
+    /// Speed, mm/s; null: the highest that camera, chain and station allow.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub speed_mm_s: Option<f64>,
-    /// Pictures a second of another camera than the one that is linked.
+    /// Frame rate of another camera than the connected one, Hz.
     #[serde(default)]
     #[ts(optional = nullable)]
     pub camera_hz: Option<f64>,
 }
 
-/// A sweep that a job would make.
+/// The sweep that a job would make.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct SweepPlan {
     /// Name of the recipe.
     pub recipe: String,
-    /// The board was touched; else it is taken to lie squarely before the camera.
+    /// True: the board was touched; false: it is assumed to be square to the camera.
     pub touched: bool,
-    /// From the board to the camera, mm.
+    /// Distance from the board to the camera, mm.
     pub depth_mm: f64,
-    /// From the first shot's stripe to the last one's, mm.
+    /// Distance from the first shot's stripe to the last one's, mm.
     pub length_mm: f64,
-    /// From one shot to the next, mm.
+    /// Distance between shots, mm.
     pub step_mm: f64,
-    /// Pictures.
+    /// Number of pictures.
     pub shots: usize,
-    /// Across the part however it is turned, mm.
+    /// Size of the part in any rotation: the diagonal of its drawing, mm.
     pub part_mm: f64,
-    /// What the camera sees of the board: x0 y0 x1 y1, mm.
+    /// The camera's field of view on the board: x0 y0 x1 y1, mm.
     pub field_mm: [f64; 4],
-    /// Ends of the first shot's stripe, then of the last one's, in the order around what is swept, mm.
+    /// The corners of the swept area in order: the ends of the first shot's stripe, then of the last one's, mm.
     pub swept_mm: [[f64; 2]; 4],
-    /// How far the part may lie off the picture's middle along the sweep, mm; negative: it is never swept whole.
+    /// Largest offset of the part from the picture's middle along the sweep, mm; negative: it is never swept
+    /// completely.
     pub along_mm: f64,
-    /// The same along the stripe.
+    /// The same across the sweep, along the stripe.
     pub across_mm: f64,
-    /// Left of the working volume above the board and below it, mm; null: nobody knows it.
+    /// Reserve of the working volume above and below the board, mm; null: unknown.
     pub volume_mm: Option<[f64; 2]>,
-    /// Left to the sides of the flange's box, mm; negative: outside; null: no box is stated or the robot's place is
-    /// not known.
+    /// Distance of the flange from the sides of its box, mm; negative: outside; null: no box is stated, or the
+    /// robot's pose is unknown.
     pub box_mm: Option<f64>,
-    /// Names of a flange pose's numbers.
+    /// Labels of a flange pose's numbers.
     pub labels: Vec<String>,
-    /// The flange at the first and the last shot; empty where the robot's place is not known.
+    /// Poses of the flange at the first and the last shot; empty if the robot's pose is unknown.
     pub flange: Vec<Vec<f64>>,
-    /// What is swept, and how far a part in its middle reaches, in the camera's picture as it stands now, px; empty:
-    /// not known.
+    /// The swept area, and the extent of a part in its middle, in the camera's present picture, px; empty: unknown.
     pub seen_px: Vec<Vec<[f64; 2]>>,
-    /// Pictures a second that the camera sends; null: not known.
+    /// Frame rate of the camera, Hz; null: unknown.
     pub camera_hz: Option<f64>,
-    /// Pictures of this size that a scan of this station measured in a second; null: none did.
+    /// Rate at which a scan of this station measured pictures of this size, Hz; null: no scan did.
     pub chain_hz: Option<f64>,
-    /// The station's limit, mm/s.
+    /// The station's speed limit, mm/s.
     pub limit_mm_s: Option<f64>,
-    /// Of a scan that does not stop for its pictures; null: nothing is known that limits it.
+    /// Pace of a scan that does not stop for its pictures; null: no limit is known.
     pub pace: Option<Pace>,
 }
 
-/// Speed, step and pictures a second that go together.
+/// Matching values of speed, step and frame rate.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct Pace {
     /// mm/s.
     pub speed_mm_s: f64,
-    /// mm a shot.
+    /// Distance between shots, mm.
     pub step_mm: f64,
-    /// Pictures a second.
+    /// Frame rate, Hz.
     pub rate_hz: f64,
-    /// Over the whole length, s.
+    /// Duration over the whole length, s.
     pub seconds: f64,
-    /// camera, chain or speed: the one that allows no more; null: none does.
+    /// camera, chain or speed: the limiting one; null: none is known.
     pub limited_by: Option<String>,
-    /// The fastest that each of them bears at this step, mm/s.
+    /// The highest speed that each of them allows at this step, mm/s.
     pub bears: Vec<(String, f64)>,
-    /// The step that is left at this speed, mm.
+    /// The step that results at this speed, mm.
     pub left_step_mm: f64,
 }
 
@@ -121,7 +121,7 @@ impl From<Paced> for Pace {
 }
 
 impl SweepPlan {
-    /// As a page shows it, poses in the robot's notation.
+    /// The message that a page shows; poses in the robot's convention.
     pub fn of(p: Preview, robot: Convention) -> SweepPlan {
         let f = p.sweep;
         SweepPlan {

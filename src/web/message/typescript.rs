@@ -1,10 +1,10 @@
-//! In: the messages' types. Out: their TypeScript declarations, which the pages' editors and tests read.
+//! In: the messages' types. Out: their TypeScript declarations, which the pages' editors and tests use.
 //! Frame and unit: none.
 
 use super::*;
 use ts_rs::TS;
 
-/// `docs/messages.d.ts`; a test holds the file against this.
+/// Content of `docs/messages.d.ts`; a test compares the file with this.
 pub fn declarations() -> String {
     let all = [
         of_bar(),
@@ -25,7 +25,7 @@ pub fn declarations() -> String {
     )
 }
 
-/// What the bar shows; how a job stands, and what went wrong.
+/// The bar, job states and faults.
 fn of_bar() -> Vec<String> {
     vec![
         Mode::decl(),
@@ -39,7 +39,7 @@ fn of_bar() -> Vec<String> {
     ]
 }
 
-/// What can be ordered.
+/// Orders.
 fn of_orders() -> Vec<String> {
     vec![
         Target::decl(),
@@ -61,7 +61,7 @@ fn of_orders() -> Vec<String> {
     ]
 }
 
-/// What came of an order, and the camera that an outcome may show.
+/// Results of orders, and the camera's state in them.
 fn of_outcomes() -> Vec<String> {
     vec![
         CheckLine::decl(),
@@ -89,12 +89,12 @@ fn of_outcomes() -> Vec<String> {
     ]
 }
 
-/// What moves the robot, and what viewers are told.
+/// The robot's motions, and events for viewers.
 fn of_motion() -> Vec<String> {
     vec![Asked::decl(), SimulatedCell::decl(), MotionState::decl(), Arming::decl(), InTheCell::decl(), Event::decl()]
 }
 
-/// Who may come in and what they confirm.
+/// Sessions, the lease and confirmations.
 fn of_door() -> Vec<String> {
     vec![Knock::decl(), Session::decl(), TakeLease::decl(), Confirmed::decl(), Grant::decl(), Redeem::decl()]
 }
@@ -133,7 +133,7 @@ fn of_recipes() -> Vec<String> {
     ]
 }
 
-/// A scan looked at, and measured in.
+/// Viewing a scan and measuring in it.
 fn of_surface() -> Vec<String> {
     vec![
         MapHead::decl(),
@@ -151,7 +151,7 @@ fn of_surface() -> Vec<String> {
     ]
 }
 
-/// A sweep before it is made, and how places repeat.
+/// Planned sweeps, and repeatability.
 fn of_sweep() -> Vec<String> {
     vec![SweepAsk::decl(), Pace::decl(), SweepPlan::decl(), RepeatsAsk::decl(), Spread::decl(), Repeats::decl()]
 }

@@ -1,5 +1,5 @@
-//! What asks the controller for a screen: arming, trying an output, reading the pose after somebody has looked. None of
-//! it holds the desk's lock meanwhile.
+//! What asks the controller on behalf of a screen: arming, trying an output, reading the pose after a person has
+//! looked. The desk's lock is not held meanwhile.
 
 use super::desk::Desk;
 use super::session::Session;
@@ -14,11 +14,12 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 impl Desk {
-    /// Takes the arm for motions from this tab.
+    /// Arms the robot for motions from this tab.
     pub fn arm(&self, tab: &Tab) -> Result<MotionState> {
         let made = if self.armed() { None } else { Some(self.guarded()?) };
         let mut at = self.at();
-        // Of two who arm at once the second one's guard is dropped after the desk: that asks the controller.
+        // If two tabs arm at once, the second guard is dropped after the desk's lock, because dropping it asks the
+        // controller.
         let late = match made {
             Some(guard) if !at.armed() => {
                 self.brake.arm(Some(guard.stop_button()));
@@ -38,7 +39,7 @@ impl Desk {
         Ok(state)
     }
 
-    /// An armed guard. What a program that was killed left lit goes off before anybody goes near.
+    /// An armed guard. Outputs that a killed program left on are switched off before anybody goes near.
     fn guarded(&self) -> Result<Guard> {
         let Some(uri) = &self.links.robot else {
             return Err(Fault::refused("no robot: the screen was served without --robot")
@@ -52,7 +53,8 @@ impl Desk {
         Ok(guard)
     }
 
-    /// Tries an output of the controller, from the tab that armed it, while no job has it; its number. STOP ends it.
+    /// Tries an output of the controller, from the tab that armed it, while no job has the robot; returns the
+    /// output's number. STOP ends it.
     pub fn try_output(&self, tab: &Tab, what: Output) -> Result<u16> {
         let stop = Arc::new(AtomicBool::new(false));
         let mut at = self.at();
@@ -67,7 +69,7 @@ impl Desk {
         try_output(session.guard().link(), &outputs, what, &stop)
     }
 
-    /// Somebody has looked at the robot after a motion that was stopped: motions may be proposed again.
+    /// A person has looked at the robot after a stopped motion: motions may be proposed again.
     pub fn looked(&self) -> Result<MotionState> {
         let stop = Arc::new(AtomicBool::new(false));
         let mut at = self.at();

@@ -1,28 +1,28 @@
-//! STOP's own way to whatever has the robot: it waits for nobody who holds the desk.
+//! Direct path of STOP to the current user of the robot: it never waits for the desk's lock.
 
 use crate::arm::rules::StopButton;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What STOP ends. Under this lock values are exchanged and nothing else: no controller is asked, no disk is read, no
-/// viewer is told. Whoever takes it while he holds the desk takes the desk first.
+/// What STOP ends. Under this lock values are only exchanged: no controller is asked, no disk is read, no viewer is
+/// notified. Code that needs both locks takes the desk's lock first.
 #[derive(Default)]
 pub(super) struct Brake(Mutex<Ends>);
 
 #[derive(Default)]
 struct Ends {
-    /// Halts the armed arm.
+    /// Halts the armed robot.
     button: Option<StopButton>,
     has: Option<Has>,
-    /// Why somebody has to look at the robot before it moves again.
+    /// Why a person must look at the robot before it moves again.
     look: Option<String>,
 }
 
-/// Who has the robot now.
+/// The current user of the robot.
 struct Has {
-    /// None: a request that tries an output, or says that somebody has looked.
+    /// `None`: a request that tries an output, or that reports that a person has looked.
     job: Option<String>,
-    /// Ends it. Each time that the robot is lent has a flag of its own, so that no late STOP ends the next one.
+    /// Ends the use. Each use has a separate flag, so that a late STOP does not end the next one.
     stop: Arc<AtomicBool>,
 }
 
@@ -40,22 +40,22 @@ impl Brake {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The arm that this button halts was taken (`None`: was given back).
+    /// The robot that this button halts was armed; `None`: it was disarmed.
     pub fn arm(&self, button: Option<StopButton>) {
         self.ends().button = button;
     }
 
-    /// What halts the armed arm.
+    /// The button that halts the armed robot.
     pub fn button(&self) -> Option<StopButton> {
         self.ends().button.clone()
     }
 
-    /// A job, or a request, has the robot; the flag ends it.
+    /// A job or a request has the robot; the flag ends it.
     pub fn lend(&self, job: Option<&str>, stop: Arc<AtomicBool>) {
         self.ends().has = Some(Has { job: job.map(str::to_owned), stop });
     }
 
-    /// Nobody has the robot any more; `unknown`: why nobody knows where the arm is.
+    /// The robot is free again; `unknown`: why the arm's pose is unknown.
     pub fn back(&self, unknown: Option<&str>) {
         let mut ends = self.ends();
         ends.has = None;
@@ -64,12 +64,12 @@ impl Brake {
         }
     }
 
-    /// Ends whatever has the robot, and halts the arm. False: nobody has it.
+    /// Ends the current use of the robot and halts the arm. Returns false if nothing uses the robot.
     pub fn pull(&self, why: &str) -> bool {
         self.pull_if(why, |_| true)
     }
 
-    /// The same where this job has it.
+    /// The same, if this job has the robot.
     pub fn pull_job(&self, id: &str, why: &str) -> bool {
         self.pull_if(why, |has| has.job.as_deref() == Some(id))
     }
@@ -82,17 +82,17 @@ impl Brake {
         true
     }
 
-    /// Halts the arm; whatever has the robot hears of it by its motion.
+    /// Halts the arm; the current user learns it from its motion.
     pub fn halt(&self, why: &str) {
         self.ends().halt(why);
     }
 
-    /// Why somebody has to look at the robot.
+    /// Why a person must look at the robot.
     pub fn look(&self) -> Option<String> {
         self.ends().look.clone()
     }
 
-    /// Somebody has looked. False: STOP was pressed meanwhile, which stands.
+    /// A person has looked. Returns false if STOP was pressed meanwhile; that STOP stays in effect.
     pub fn looked(&self, stop: &AtomicBool) -> bool {
         let mut ends = self.ends();
         if stop.load(Ordering::SeqCst) {

@@ -1,4 +1,4 @@
-//! The button that is held over a motion: it confirms what is shown, once, and letting it go halts.
+//! The button that is held during a motion: it confirms the shown motion once, and releasing it halts the arm.
 
 use super::desk::Desk;
 use super::state::{At, Hold, Robot, Step};
@@ -10,19 +10,19 @@ use std::sync::PoisonError;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// While something moves the tab that holds the button says so again and again; silence for so long halts.
+/// During a motion the tab that holds the button reports so repeatedly; silence for this long halts the arm.
 pub const SILENCE: Duration = Duration::from_secs(1);
-/// How often a motion that is shown looks whether its job was stopped.
+/// Interval at which a shown motion checks whether its job was stopped.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// What becomes of a motion that was shown.
+/// Decision about a motion that was shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Answer {
-    /// It is made.
+    /// Confirmed; it is made.
     Yes,
-    /// It is not, and the job ends.
+    /// Refused; the job ends.
     No,
-    /// Nobody said anything while it was good.
+    /// Nobody answered while the motion was valid.
     Late,
     /// The job was ended.
     Over,
@@ -33,7 +33,8 @@ fn no(what: impl Into<String>) -> Fault {
 }
 
 impl Desk {
-    /// The button goes down over the motion that is shown. Gives the name under which it is redeemed once.
+    /// The button is pressed on the shown motion. Returns the name under which the confirmation can be redeemed
+    /// once.
     pub fn press(&self, tab: &Tab, what: &Confirmed) -> Result<String> {
         let at = self.at();
         let asked = self.may(&at, tab, what)?;
@@ -44,7 +45,7 @@ impl Desk {
         Ok(self.grants.give(tab, what.clone()))
     }
 
-    /// It was held long enough: the motion is confirmed, once.
+    /// The button was held long enough: the motion is confirmed, once.
     pub fn go(&self, tab: &Tab, grant: &str, what: &Confirmed) -> Result<()> {
         self.grants.redeem(grant, tab, what)?;
         let mut at = self.at();
@@ -60,7 +61,7 @@ impl Desk {
         Ok(())
     }
 
-    /// The motion that is shown, where this tab may confirm it as `what`.
+    /// The shown motion, if this tab may confirm it as `what`.
     fn may<'a>(&self, at: &'a At, tab: &Tab, what: &Confirmed) -> Result<&'a Asked> {
         if at.by.as_ref() != Some(tab) {
             return Err(no("the robot is not armed from this screen"));
@@ -78,7 +79,7 @@ impl Desk {
         }
     }
 
-    /// No: the job that asks ends.
+    /// Refuses the motion: the job that proposed it ends.
     pub fn refuse(&self, what: &Confirmed) -> Result<()> {
         let mut at = self.at();
         match &at.robot {
@@ -91,7 +92,7 @@ impl Desk {
         }
     }
 
-    /// The tab that holds the button says that it still does. False: it holds none.
+    /// The tab reports that it still holds the button. Returns false if it holds none.
     pub fn held(&self, tab: &Tab, grant: &str) -> bool {
         let mut at = self.at();
         at.silent();
@@ -101,7 +102,7 @@ impl Desk {
         true
     }
 
-    /// Shows a motion and waits for what becomes of it; `stop` ends the job that asks.
+    /// Shows a motion and waits for the decision; `stop` ends the job that proposed it.
     pub(super) fn ask(&self, asked: Asked, stop: &AtomicBool) -> Answer {
         let until = Instant::now() + Duration::from_secs_f64(asked.within_s);
         let mut at = self.at();

@@ -1,5 +1,5 @@
-//! The operator's desk: who has the robot, and what halts it. What takes long (the controller, the disk) is done while
-//! nobody holds the desk's lock.
+//! The operator's desk: who uses the robot, and what halts it. Slow work (controller, disk) is done without holding
+//! the desk's lock.
 
 use super::brake::Brake;
 use super::grants::Grants;
@@ -16,41 +16,41 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Lines of what a job said that are kept.
+/// Most lines of a job's messages that are stored.
 const MOST_SAID: usize = 60;
 
-/// What a screen can move and look with.
+/// Connections and permissions of a screen.
 #[derive(Default)]
 pub struct Links {
     /// The station's folder: [motion], [tool], the log of motions.
     pub station: PathBuf,
     /// The robot's URI.
     pub robot: Option<String>,
-    /// It may be moved.
+    /// The robot may be moved.
     pub may_move: bool,
-    /// What that robot says, read over and over.
+    /// State of that robot, polled continuously.
     pub watched: Option<Arc<Watched>>,
     /// The camera.
     pub camera: Option<Arc<Camera>>,
-    /// The cell that robot and camera are of, where it is one of ours.
+    /// The simulated cell to which robot and camera belong, if it is one.
     pub simulated: Option<SimulatedRobot>,
     /// Ends the program.
     pub stop: Arc<AtomicBool>,
 }
 
-/// Where the operator sits.
+/// The desk of a screen.
 pub struct Desk {
-    /// What there is.
+    /// The available connections.
     pub links: Links,
     hub: Arc<Hub>,
     pub(super) grants: Grants,
-    /// What STOP needs, beside the desk's lock.
+    /// What STOP needs, outside the desk's lock.
     pub(super) brake: Brake,
     at: Mutex<At>,
     pub(super) wake: Condvar,
 }
 
-/// Why nobody gets the robot now.
+/// Error for a request for the robot while it is in use.
 fn in_use(robot: &Robot) -> Fault {
     match robot {
         Robot::Job(_) => Fault::refused("a job has the robot").next("wait until it has ended, or stop it"),
@@ -61,7 +61,7 @@ fn in_use(robot: &Robot) -> Fault {
 }
 
 impl Desk {
-    /// Nothing is armed.
+    /// A desk with nothing armed.
     pub fn new(links: Links, hub: Arc<Hub>) -> Desk {
         let (grants, brake) = (Grants::default(), Brake::default());
         Desk { links, hub, grants, brake, at: Mutex::default(), wake: Condvar::new() }
@@ -71,7 +71,7 @@ impl Desk {
         self.at.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// As it stands.
+    /// The current state.
     pub fn state(&self) -> MotionState {
         self.seen(&self.at())
     }
@@ -97,33 +97,33 @@ impl Desk {
         self.hub.tell(&Event::Motion(Box::new(self.seen(at))));
     }
 
-    /// Tells everybody how it stands.
+    /// Sends the state to all viewers.
     pub fn told(&self) -> MotionState {
         let at = self.at();
         self.tell(&at);
         self.seen(&at)
     }
 
-    /// A job has the robot.
+    /// Whether a job has the robot.
     pub fn has_job(&self) -> bool {
         matches!(self.at().robot, Robot::Job(_))
     }
 
-    /// Some tab has armed the robot.
+    /// Whether the robot is armed.
     pub fn armed(&self) -> bool {
         self.at().armed()
     }
 
-    /// Takes the guard out for a job, or for a request (`None`), until [`Desk::back`]; `stop` ends it.
+    /// Takes the guard for a job, or for a request (`None`), until [`Desk::back`]; `stop` ends it.
     ///
     /// # Errors
-    /// The robot is not armed, somebody else has it, or `stop` is set already.
+    /// The robot is not armed or in use, or `stop` is already set.
     pub(super) fn lend(&self, at: &mut At, job: Option<&str>, stop: &Arc<AtomicBool>) -> Result<Box<Guard>> {
         let taken = if job.is_some() { Robot::Job(Step::Works) } else { Robot::Lent };
         match std::mem::replace(&mut at.robot, taken) {
             Robot::Rests(guard) => {
                 self.brake.lend(job, stop.clone());
-                // A STOP that came before the brake knew of this job has set its flag already.
+                // A STOP before the brake knew of this job has already set the job's flag.
                 if stop.load(Ordering::SeqCst) {
                     self.brake.back(None);
                     at.robot = Robot::Rests(guard);
@@ -144,7 +144,7 @@ impl Desk {
         }
     }
 
-    /// Whoever had the guard gives it back.
+    /// The user of the guard returns it.
     pub(super) fn back(&self, guard: Box<Guard>) {
         let mut at = self.at();
         self.brake.back(guard.unknown());
@@ -152,7 +152,7 @@ impl Desk {
         self.tell(&at);
     }
 
-    /// Gives the arm back. Its guard is dropped after the desk: that asks the controller.
+    /// Disarms the robot. The guard is dropped after the desk's lock, because dropping it asks the controller.
     pub fn disarm(&self) -> Result<MotionState> {
         let mut at = self.at();
         let guard = match std::mem::take(&mut at.robot) {
@@ -172,7 +172,7 @@ impl Desk {
         Ok(state)
     }
 
-    /// The button was let go, or can be held no longer: what moves is halted.
+    /// The button was released, or can no longer be held: a motion under way is halted.
     pub fn let_go(&self, tab: &Tab, why: &str) {
         let mut at = self.at();
         self.grants.drop_of(tab);
@@ -182,7 +182,7 @@ impl Desk {
         }
     }
 
-    /// Another tab operates from now on: nothing is armed from the former one.
+    /// Another tab operates from now on: the robot is no longer armed from the previous tab.
     pub fn handed_over(&self) {
         let mut at = self.at();
         self.grants.drop_all();
@@ -200,15 +200,15 @@ impl Desk {
         }
     }
 
-    /// STOP, from any screen: whatever has the robot ends, a light that it has on goes off, what moves is halted.
-    /// Viewers are told after that: only they wait for the desk.
+    /// STOP, from any screen: the current use of the robot ends, its lights are switched off, a motion is halted.
+    /// Viewers are notified after that: only the notification waits for the desk's lock.
     pub fn stop(&self) {
         let ended = self.brake.pull("STOP was pressed");
         self.grants.drop_all();
         self.after_stop(ended);
     }
 
-    /// STOP for one job, where it is the one that has the robot.
+    /// STOP for one job, if it has the robot.
     pub fn stop_job(&self, id: &str) {
         let ended = self.brake.pull_job(id, "STOP was pressed");
         self.after_stop(ended);
@@ -221,7 +221,7 @@ impl Desk {
         }
     }
 
-    /// A line of the job.
+    /// Adds a message of the job.
     pub fn say(&self, line: &str) {
         let mut at = self.at();
         at.told.said.push(line.to_owned());
@@ -230,7 +230,7 @@ impl Desk {
         self.tell(&at);
     }
 
-    /// A calibration's stops and the error that is expected after them, mm.
+    /// A calibration's number of stops and the error expected after them, mm.
     pub fn expects(&self, stops: usize, mm: f64) {
         let mut at = self.at();
         at.told.expected.push((stops, mm));
@@ -277,7 +277,7 @@ mod tests {
         (dir, desk, button)
     }
 
-    /// While somebody holds the desk, for as long as it takes, STOP has acted.
+    /// STOP acts even while the desk's lock is held.
     #[test]
     fn stop_does_not_wait_for_the_desk() {
         let (_dir, desk, button) = desk();
@@ -298,7 +298,8 @@ mod tests {
         assert!(desk.state().look.is_some());
     }
 
-    /// While one has the robot nobody else gets it, and nobody gives it back: no guard of an earlier time comes back.
+    /// Only one user has the robot at a time; meanwhile nobody else gets it or disarms it, and no old guard comes
+    /// back.
     #[test]
     fn one_has_the_robot_at_a_time() {
         let (_dir, desk, _) = desk();
@@ -313,7 +314,8 @@ mod tests {
         assert!(Session::begin(&desk, "0001-insert", &stop).is_err(), "it is not armed");
     }
 
-    /// A job that was stopped before it takes the robot does not get it; one that is stopped leaves the next one alone.
+    /// A job that was stopped before it takes the robot does not get it; stopping a job does not affect the next
+    /// one.
     #[test]
     fn a_stop_is_for_whoever_has_the_robot() {
         let (_dir, desk, button) = desk();
@@ -328,7 +330,7 @@ mod tests {
         assert!(second.load(Ordering::SeqCst) && button.why().is_some());
     }
 
-    /// STOP while somebody says that he has looked stands; so does one from before.
+    /// A STOP before or while a person reports that he has looked stays in effect.
     #[test]
     fn a_stop_while_somebody_looks_is_not_undone() {
         let (_dir, desk, button) = desk();

@@ -1,5 +1,5 @@
-//! In: a motion that a page shows, a button that is held. Out: the right to make it, once, used up by making it.
-//! Frame and unit: seconds; motions are named by their hash.
+//! In: a motion that a page shows, a button that is held. Out: a grant for that motion, which can be redeemed once.
+//! Frame and unit: seconds; motions are identified by their hash.
 
 use crate::fault::{Fault, Result};
 use crate::web::guard::{Tab, random_hex};
@@ -7,9 +7,9 @@ use crate::web::message::Confirmed;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// The button has to be held at least so long before anything moves.
+/// Shortest time that the button must be held before anything moves.
 pub const HELD: Duration = Duration::from_millis(800);
-/// A right that was not used for so long is gone.
+/// Time after which an unused grant expires.
 pub const LONGEST: Duration = Duration::from_secs(5);
 
 struct Grant {
@@ -19,12 +19,12 @@ struct Grant {
     given: Instant,
 }
 
-/// Rights that were given and not used yet: one at a time, because one operates.
+/// The unused grant: one at a time, because one tab operates.
 #[derive(Default)]
 pub struct Grants(Mutex<Option<Grant>>);
 
 impl Grants {
-    /// The button goes down: a new right, and every former one is gone.
+    /// The button is pressed: makes a new grant and cancels every earlier one.
     pub fn give(&self, tab: &Tab, what: Confirmed) -> String {
         let name = random_hex();
         let grant = Grant { name: name.clone(), tab: tab.clone(), what, given: Instant::now() };
@@ -32,8 +32,8 @@ impl Grants {
         name
     }
 
-    /// The button was held: uses the right up. Errors: none of this name, of another tab or pose, not held long
-    /// enough, too old.
+    /// The button was held: redeems the grant. Returns an error if no grant has this name, if it belongs to another
+    /// tab or motion, was not held long enough, or is too old.
     pub fn redeem(&self, name: &str, tab: &Tab, what: &Confirmed) -> Result<()> {
         let mut held = self.0.lock().unwrap_or_else(|e| e.into_inner());
         let no = |why: String| {
@@ -61,7 +61,7 @@ impl Grants {
         Ok(())
     }
 
-    /// A tab lets go: what it had is gone.
+    /// A tab releases the button: its grant is cancelled.
     pub fn drop_of(&self, tab: &Tab) {
         let mut held = self.0.lock().unwrap_or_else(|e| e.into_inner());
         if held.as_ref().is_some_and(|g| g.tab == *tab) {
@@ -69,7 +69,7 @@ impl Grants {
         }
     }
 
-    /// The button was let go, or nobody may go on.
+    /// Cancels the grant of any tab.
     pub fn drop_all(&self) {
         *self.0.lock().unwrap_or_else(|e| e.into_inner()) = None;
     }

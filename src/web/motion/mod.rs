@@ -1,5 +1,5 @@
-//! In: a robot, a camera, tabs that operate. Out: jobs that move the robot, each motion shown and confirmed by a held
-//! button; what lets go halts.
+//! In: a robot, a camera, tabs that operate. Out: jobs that move the robot, each motion shown and confirmed by a
+//! held button; releasing the button halts the arm.
 //! Frame and unit: base frame; mm, mm/s, s.
 
 mod arming;

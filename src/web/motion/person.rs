@@ -1,4 +1,4 @@
-//! In: what a job is about to do. Out: the yes of whoever holds the button at the screen.
+//! In: what a job is about to do. Out: the confirmation of the person who holds the button at the screen.
 //! Frame and unit: base frame, in the station's notation.
 
 use super::button::Answer;
@@ -10,24 +10,24 @@ use crate::station::job::{Ask, Operator};
 use crate::web::message::{Asked, GateLight};
 use std::sync::atomic::AtomicBool;
 
-/// Steps that only look, far from the part: the button may stay down from one to the next.
+/// Steps that only measure, far from the part: the button may stay pressed from one to the next.
 const LOOKING: [&str; 3] = ["touch", "scan", "calibrate"];
 
-/// Whoever operates.
+/// The person who operates.
 pub struct Person<'a> {
-    /// Where he sits.
+    /// The person's desk.
     pub desk: &'a Desk,
-    /// The job that asks him.
+    /// The job that asks for confirmation.
     pub job: &'a str,
     /// Ends that job.
     pub stop: &'a AtomicBool,
-    /// Notation of the poses that he is shown.
+    /// Notation of the poses that are shown.
     pub robot: Convention,
-    /// A motion is good for so long after it was shown, s.
+    /// How long a shown motion stays valid, s.
     pub within_s: f64,
-    /// Hears of every step.
+    /// Called at every step.
     pub step: &'a dyn Fn(&str),
-    /// Nobody answered in time.
+    /// True if nobody answered in time.
     pub late: bool,
 }
 
@@ -77,8 +77,8 @@ impl Operator for Person<'_> {
         self.desk.over();
     }
 
-    /// Whoever pressed Arm stands beside the robot, and since a halt somebody has pressed that he has looked: without
-    /// these no job has it.
+    /// A person must have looked since the last halt. No job has the robot before a person pressed Arm beside it
+    /// and, after a halt, confirmed that he has looked.
     fn looked(&mut self, why: &str) -> Result<bool> {
         self.tell(why);
         Ok(self.desk.state().look.is_none())

@@ -1,4 +1,4 @@
-//! A job's, or a request's, time with the robot: whatever ends it, the guard comes back to the desk.
+//! The time for which a job or a request uses the robot; however it ends, the guard returns to the desk.
 
 use super::desk::Desk;
 use super::state::At;
@@ -7,7 +7,7 @@ use crate::fault::Result;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// The time with the robot; ends when it is dropped.
+/// Use of the robot; ends when this is dropped.
 pub struct Session<'a> {
     desk: &'a Desk,
     guard: Option<Box<Guard>>,
@@ -17,7 +17,7 @@ impl Session<'_> {
     /// Takes the robot for a job.
     ///
     /// # Errors
-    /// It is not armed, in use, or `stop` is set already.
+    /// The robot is not armed or in use, or `stop` is already set.
     pub fn begin<'a>(desk: &'a Desk, job: &str, stop: &Arc<AtomicBool>) -> Result<Session<'a>> {
         let mut at = desk.at();
         let guard = desk.lend(&mut at, Some(job), stop)?;
@@ -27,15 +27,15 @@ impl Session<'_> {
         Ok(Session { desk, guard: Some(guard) })
     }
 
-    /// Takes it for a request.
+    /// Takes the robot for a request.
     ///
     /// # Errors
-    /// As [`Session::begin`].
+    /// As for [`Session::begin`].
     pub(super) fn request<'a>(desk: &'a Desk, at: &mut At, stop: &Arc<AtomicBool>) -> Result<Session<'a>> {
         Ok(Session { desk, guard: Some(desk.lend(at, None, stop)?) })
     }
 
-    /// The robot behind its rules.
+    /// The robot, accessed through its guard.
     pub fn guard(&mut self) -> &mut Guard {
         self.guard.as_mut().expect("until it is dropped")
     }

@@ -1,5 +1,5 @@
-//! In: a folder. Out: a simulated cell in this process, on ports of this machine, and a station that fits it; what
-//! happens in it goes into cell.jsonl.
+//! In: a folder. Out: a simulated cell in this process, on local ports, and a station that fits it; the cell's
+//! events go into cell.jsonl.
 //! Frame and unit: scene, mm; s of the cell.
 
 use crate::cell::{Cell, CellOptions, Over, Served};
@@ -12,20 +12,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Parts whose components there are, each with the scene that has its socket.
+/// Parts that have a component, each with the scene that contains its socket.
 const PARTS: [(&str, &str); 4] = [
     ("led", DEFAULT_SCENE),
     ("osc", DEFAULT_SCENE),
     ("flash", DEFAULT_SCENE),
     ("dimm", include_str!("../../../data/scenes/dimm.toml")),
 ];
-/// Solids that come first in those scenes.
+/// Number of solids that come first in those scenes.
 const BOARD_AND_TABLE: usize = 2;
-/// An operator jogs no better than this, mm.
+/// Error of an operator's jogging, mm.
 const JOGGED_OFF_MM: [f64; 2] = [3.0, -2.0];
-/// The log is written this often.
+/// Interval at which the log is written.
 const LOG: Duration = Duration::from_millis(50);
-/// The camera's pictures a second while nobody measures: a glance.
+/// Frame rate of the camera while no job measures, Hz.
 const GLANCES: f64 = 4.0;
 
 /// The calibration board of the simulated cell.
@@ -41,17 +41,18 @@ pub fn board() -> BoardSpec {
     }
 }
 
-/// A simulated cell and who stands beside it.
+/// A simulated cell and the person beside it.
 pub struct SimulatedRobot {
     served: Served,
-    /// What the gripper holds and whether the arm stands over the board: never held over what takes long.
+    /// The part whose component the gripper holds, and whether the arm is over the board. The lock is never held
+    /// during slow work.
     at: Mutex<(String, bool)>,
     /// One person works in the cell at a time.
     hands: Mutex<()>,
     over: Arc<AtomicBool>,
 }
 
-/// The board with this part's socket alone, in its middle: the pointer touches the bare board around it.
+/// The board with only this part's socket, in its middle: the pointer touches the bare board around it.
 fn scene(part: &str) -> Result<SceneSpec> {
     let text = PARTS.iter().find(|(name, _)| *name == part).map(|(_, text)| *text).ok_or_else(|| {
         Fault::usage(format!("{part:?}: there is no such component here")).next("choose one from the list")
@@ -64,14 +65,14 @@ fn scene(part: &str) -> Result<SceneSpec> {
 }
 
 impl SimulatedRobot {
-    /// Starts it; `speed` seconds of the cell pass in one of ours.
+    /// Starts the cell; `speed` is its seconds per real second.
     ///
     /// # Errors
-    /// No port or no thread can be had; an unknown part.
+    /// No port or thread is available; an unknown part.
     pub fn start(folder: &Path, part: &str, seed: u64, speed: f64) -> Result<SimulatedRobot> {
         let options = CellOptions { board: Some(board()), speed, ..CellOptions::of(scene(part)?, seed) };
         let served = Served::here(Cell::new(CellOptions { holds: Some(part.to_owned()), ..options })?)?;
-        // As the operator leaves it: motor on, nothing pending.
+        // As an operator leaves it: motor on, no error pending.
         served.controller.set_motor(true);
         let over = Arc::new(AtomicBool::new(false));
         follow(served.cell.clone(), folder.join("cell.jsonl"), over.clone())?;
@@ -89,7 +90,7 @@ impl SimulatedRobot {
     pub fn robot_uri(&self) -> String {
         self.served.robot_uri()
     }
-    /// The camera as a URI, to look at.
+    /// The camera as a URI, at the low frame rate for viewing.
     pub fn camera_uri(&self) -> String {
         format!("cell://{}?rate={GLANCES}", self.served.camera)
     }
@@ -98,14 +99,14 @@ impl SimulatedRobot {
         self.at.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// As pages see it.
+    /// The state as pages see it.
     pub fn state(&self) -> SimulatedCell {
         let (holds, over_board) = self.at().clone();
         SimulatedCell { parts: PARTS.iter().map(|(name, _)| (*name).to_owned()).collect(), holds, over_board }
     }
 
-    /// A person lays the board with a part's socket before the robot, puts its component into the gripper, and jogs
-    /// the arm there, or over the calibration board.
+    /// A person puts the board with a part's socket before the robot, puts its component into the gripper, and jogs
+    /// the arm above it, or above the calibration board.
     pub fn put(&self, holds: Option<&str>, over_board: bool) -> Result<()> {
         let _one = self.hands.lock().unwrap_or_else(PoisonError::into_inner);
         let part = holds.map_or_else(|| self.at().0.clone(), str::to_owned);
@@ -123,7 +124,7 @@ impl Drop for SimulatedRobot {
     }
 }
 
-/// Writes what happens, a line of JSON each.
+/// Writes events, one line of JSON each.
 fn follow(cell: Cell, path: PathBuf, over: Arc<AtomicBool>) -> Result<()> {
     let body = move || {
         let mut said = 0;
@@ -131,7 +132,7 @@ fn follow(cell: Cell, path: PathBuf, over: Arc<AtomicBool>) -> Result<()> {
             let news = cell.log_after(said);
             said += news.len();
             for entry in &news {
-                // A log that cannot be written stops no cell.
+                // The cell continues if the log cannot be written.
                 let _ = crate::files::append_line(&path, &serde_json::to_string(entry).expect("plain data"));
             }
             std::thread::sleep(LOG);
@@ -153,13 +154,13 @@ mod tests {
 
     const PATIENCE: Duration = Duration::from_secs(20);
 
-    /// Pages hear of the cell while somebody works in it, however long that takes.
+    /// Pages can read the cell's state while a person works in it, however long that takes.
     #[test]
     fn who_looks_does_not_wait_for_hands_in_the_cell() {
         let dir = tempfile::tempdir().unwrap();
         let robot = Arc::new(SimulatedRobot::start(dir.path(), "osc", 3, 1.0).unwrap());
         let (tell, told) = channel();
-        // It holds what whoever works in the cell holds all the while.
+        // The test holds the lock that a person's work in the cell holds all the time.
         let works = robot.hands.lock().unwrap();
         let (looks, puts) = (robot.clone(), robot.clone());
         std::thread::spawn(move || tell.send(looks.state()));
@@ -170,7 +171,7 @@ mod tests {
         assert_eq!(robot.state().holds, "led");
     }
 
-    /// A laser that is tried goes off when STOP is pressed, long before its time.
+    /// A laser that is being tried goes off when STOP is pressed, long before its time.
     #[test]
     fn stop_switches_off_what_is_tried() {
         let dir = tempfile::tempdir().unwrap();
@@ -195,7 +196,7 @@ mod tests {
                 std::thread::sleep(Duration::from_millis(2));
             }
         };
-        // The whole time, for comparison.
+        // The full duration, for comparison.
         let begun = cell.clock().now();
         desk.try_output(&tab, Output::Line).unwrap();
         let lit = switched(true, begun);

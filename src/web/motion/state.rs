@@ -1,44 +1,44 @@
-//! Who has the robot, and what becomes of the motion that is shown.
+//! Who uses the robot, and the state of the motion that is shown.
 
 use crate::arm::rules::Guard;
 use crate::web::guard::Tab;
 use crate::web::message::Asked;
 use std::time::Instant;
 
-/// Where the robot is. Its guard is here only while nobody has it.
+/// State of the robot. The guard is stored here only while nothing uses the robot.
 #[derive(Default)]
 pub(super) enum Robot {
     /// Not armed.
     #[default]
     Away,
-    /// Armed, and nobody has it.
+    /// Armed and free.
     Rests(Box<Guard>),
-    /// A request has it: it tries an output, or reads the pose after somebody has looked.
+    /// A request has it: it tries an output, or reads the pose after a person has looked.
     Lent,
     /// A job has it.
     Job(Step),
 }
 
-/// What the job that has the robot does.
+/// Activity of the job that has the robot.
 pub(super) enum Step {
     /// No motion is shown.
     Works,
-    /// A motion is shown, and nobody has answered.
+    /// A motion is shown, and nobody has answered yet.
     Shown(Box<Asked>),
-    /// It was refused; the job does not know yet.
+    /// The motion was refused; the job has not noticed yet.
     Refused(Box<Asked>),
-    /// It was confirmed, and is made.
+    /// The motion was confirmed and is under way.
     Moves(Box<Asked>),
 }
 
-/// A button that is down. It may stay down from one motion to the next.
+/// A button that is held. It may stay pressed from one motion to the next.
 pub(super) struct Hold {
     pub tab: Tab,
     pub grant: String,
     pub heard: Instant,
 }
 
-/// What pages are told beside the robot's own state.
+/// What pages show beside the robot's state.
 #[derive(Clone, Default)]
 pub(super) struct Told {
     pub job: Option<String>,
@@ -47,18 +47,18 @@ pub(super) struct Told {
     pub expected: Vec<(usize, f64)>,
 }
 
-/// What the desk's lock holds.
+/// The data under the desk's lock.
 #[derive(Default)]
 pub(super) struct At {
     pub robot: Robot,
-    /// The tab that armed it; none once another one operates.
+    /// The tab that armed the robot; `None` after another tab has taken over.
     pub by: Option<Tab>,
     pub hold: Option<Hold>,
     pub told: Told,
 }
 
 impl At {
-    /// The motion that is shown, or made.
+    /// The motion that is shown, refused or under way.
     pub fn asked(&self) -> Option<&Asked> {
         match &self.robot {
             Robot::Job(Step::Shown(asked) | Step::Refused(asked) | Step::Moves(asked)) => Some(asked.as_ref()),
@@ -74,7 +74,7 @@ impl At {
         !matches!(self.robot, Robot::Away)
     }
 
-    /// The motion that waits for an answer becomes something else.
+    /// Moves the job from a shown motion to the next step.
     pub fn answer(&mut self, with: impl FnOnce(Box<Asked>) -> Step) {
         self.robot = match std::mem::take(&mut self.robot) {
             Robot::Job(Step::Shown(asked)) => Robot::Job(with(asked)),
@@ -89,7 +89,7 @@ impl At {
         }
     }
 
-    /// Counts the time since the held button was heard, while something moves.
+    /// During a motion, updates the longest time since the held button last reported.
     pub fn silent(&mut self) {
         if let (true, Some(hold)) = (self.moves(), &self.hold) {
             let ms = hold.heard.elapsed().as_secs_f64() * 1e3;

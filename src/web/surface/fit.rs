@@ -1,35 +1,36 @@
-//! In: heights at places, each with its standard deviation. Out: the straight line or plane through them, with
+//! In: heights at points, each with its standard deviation. Out: the straight line or plane through them, with its
 //! covariance.
-//! Frame and unit: mm; the covariance is that of the coefficients, scaled up where the places scatter more than they
-//! state.
+//! Frame and unit: mm. The covariance is that of the coefficients, scaled up if the points scatter more than their
+//! standard deviations state.
 
 use crate::geometry::{Mat3, Vec3};
 
 /// z = coefficients · (1, x - x0, y - y0).
 pub struct Surface {
-    /// Middle of the places, x and y.
+    /// Mean of the points, x and y.
     pub middle: [f64; 2],
-    /// Height at the middle, slopes along x and y.
+    /// Height at `middle`, slopes along x and y.
     pub coefficients: Vec3,
-    /// Of the coefficients.
+    /// Covariance of the coefficients.
     pub covariance: Mat3,
-    /// How far the places lie off it, rms, along z.
+    /// Distance of the points from the surface, rms, along z.
     pub rms: f64,
-    /// Places that went in.
+    /// Number of points used.
     pub places: usize,
 }
 
-/// A height: x, y, z and the standard deviation of z.
+/// A point: x, y, z and the standard deviation of z.
 pub type Place = [f64; 4];
 
-/// Least standard deviation that a height is believed to have, mm: keeps a cell that states none from ruling alone.
+/// Smallest standard deviation that a height is given, mm: prevents a cell that states none from dominating the
+/// fit.
 const FINEST: f64 = 1e-4;
-/// Share of the places' extent below which they are taken for a line: no slope is fitted across it.
+/// Fraction of the points' extent below which they count as collinear: no slope is fitted across that line.
 const FLAT: f64 = 1e-6;
 
 impl Surface {
-    /// Weighted least squares; `None` below 3 places, or where they do not determine a plane. With `line` only a
-    /// slope along x is fitted, and 2 places are enough.
+    /// Weighted least squares; `None` for fewer than 3 points, or if they do not determine a plane. With `line`
+    /// only a slope along x is fitted, and 2 points are enough.
     pub fn fit(places: &[Place], line: bool) -> Option<Surface> {
         if places.len() < if line { 2 } else { 3 } {
             return None;
@@ -52,7 +53,7 @@ impl Surface {
         let residual = |p: &Place| p[2] - row(p, &middle, line).dot(&coefficients);
         let free = n - if line { 2.0 } else { 3.0 };
         let chi: f64 = places.iter().map(|p| (residual(p) / p[3].max(FINEST)).powi(2)).sum();
-        // Cells that lie rougher than they state make everything less certain, smoother ones do not make it surer.
+        // Cells that scatter more than they state enlarge the covariance; cells that scatter less do not reduce it.
         let factor = if free > 0.0 { (chi / free).max(1.0) } else { 1.0 };
         let rms = (places.iter().map(|p| residual(p).powi(2)).sum::<f64>() / n).sqrt();
         let mut covariance = inverse * factor;
@@ -62,13 +63,13 @@ impl Surface {
         Some(Surface { middle, coefficients, covariance, rms, places: places.len() })
     }
 
-    /// Height over a place and its standard deviation.
+    /// Height of the surface at a point and its standard deviation.
     pub fn at(&self, x: f64, y: f64) -> (f64, f64) {
         let row = Vec3::new(1.0, x - self.middle[0], y - self.middle[1]);
         (row.dot(&self.coefficients), (row.transpose() * self.covariance * row)[0].max(0.0).sqrt())
     }
 
-    /// Unit normal, upwards.
+    /// Unit normal, pointing upwards.
     pub fn normal(&self) -> Vec3 {
         Vec3::new(-self.coefficients[1], -self.coefficients[2], 1.0).normalize()
     }

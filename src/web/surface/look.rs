@@ -1,5 +1,5 @@
-//! In: a scan's folder, the filters through which it is looked at. Out: its map through them; the filters are kept
-//! beside the scan, so that reload, second tab and restart see the same.
+//! In: a scan's folder, the filters for viewing it. Out: its filtered map. The filters are stored beside the scan,
+//! so that a reloaded page, a second tab and a restarted program show the same.
 //! Frame and unit: the height map's grid frame, mm.
 
 use crate::fault::{Fault, Result};
@@ -9,21 +9,21 @@ use crate::web::message::{Filtered, Filters};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-/// In the job's folder, beside the scan.
+/// Name of the filters' file in the job's folder, beside the scan.
 const KEPT: &str = "filters.json";
 
-/// A map as it is looked at.
+/// A map and its filtered version.
 #[derive(Clone)]
 pub struct Looked {
-    /// As it was measured.
+    /// The map as measured.
     pub whole: Arc<HeightMap>,
-    /// Through the filters.
+    /// The filtered map.
     pub map: Arc<HeightMap>,
-    /// What they do.
+    /// Effect of the filters.
     pub filtered: Filtered,
 }
 
-/// The map that was asked for last stays in memory.
+/// Caches the map that was requested last.
 #[derive(Default)]
 pub struct Maps(Mutex<Option<(PathBuf, Looked)>>);
 
@@ -44,27 +44,27 @@ fn through(whole: Arc<HeightMap>, filters: Filters) -> Result<Looked> {
 }
 
 impl Maps {
-    /// The map of a scan folder through its filters.
+    /// The map of a scan folder with its filters applied.
     pub fn look(&self, scan: &Path) -> Result<Looked> {
         if let Some((path, looked)) = &*self.0.lock().unwrap_or_else(|e| e.into_inner())
             && path == scan
         {
             return Ok(looked.clone());
         }
-        // Ends what a stopped process has begun in it, before files are read.
+        // Ends what a stopped process has begun in the folder, before files are read.
         load_report(scan)?;
         let text = crate::files::read_text_if_there(&kept(scan))?;
-        // Filters of another version are none: the scan is shown as it was measured.
+        // Filters of another version are ignored: the scan is shown as measured.
         let filters = text.and_then(|t| serde_json::from_str(&t).ok()).unwrap_or_default();
         let looked = through(Arc::new(HeightMap::load(scan)?), filters)?;
         *self.0.lock().unwrap_or_else(|e| e.into_inner()) = Some((scan.to_owned(), looked.clone()));
         Ok(looked)
     }
 
-    /// Looks through other filters from now on.
+    /// Sets other filters from now on.
     ///
     /// # Errors
-    /// Filters whose numbers mean nothing, or that leave nothing; the disk.
+    /// Invalid numbers in filters, filters that leave no cell, a file that cannot be written.
     pub fn set(&self, scan: &Path, filters: Filters) -> Result<Filtered> {
         let looked = through(self.look(scan)?.whole, filters)?;
         if looked.filtered.left == 0 {

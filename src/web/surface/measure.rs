@@ -1,4 +1,4 @@
-//! In: a height map and the places that were pointed at. Out: the distance between two of them, or of one from a plane.
+//! In: a height map and selected points. Out: the distance between two of them, or of one from a plane.
 //! Frame and unit: grid frame, mm, degrees.
 
 use super::fit::Surface;
@@ -8,10 +8,11 @@ use crate::geometry::Vec3;
 use crate::scan::HeightMap;
 use crate::web::message::{Distance, Measure, MeasureAnswer};
 
-/// Cells of a plane that are fitted; of more every k-th is taken.
+/// Most cells of a plane that are fitted; of more cells every k-th is used.
 const MOST_CELLS: usize = 200_000;
 
-/// Measures. Errors: places where nothing was seen, boxes with fewer than 3 cells or all in a row.
+/// Measures. Returns an error for points where nothing was measured, and boxes with fewer than 3 cells or only
+/// collinear cells.
 pub fn measure(map: &HeightMap, what: &Measure) -> Result<MeasureAnswer> {
     match what {
         Measure::TwoPoints(ask) => two_points(&pointed(map, &ask.a)?, &pointed(map, &ask.b)?),
@@ -19,13 +20,13 @@ pub fn measure(map: &HeightMap, what: &Measure) -> Result<MeasureAnswer> {
     }
 }
 
-/// A place that was pointed at, with its variances.
+/// A selected point, with its variances.
 struct Pointed {
     place: Vec3,
     variance: Vec3,
 }
 
-/// Where a cell says a point lies: in the plane it may be anywhere in the cell.
+/// The point that a cell defines. Its position in the plane is uncertain by the cell's size.
 fn pointed(map: &HeightMap, at: &[f64; 2]) -> Result<Pointed> {
     let Some((z, sigma)) = cell_at(map, at[0], at[1]) else {
         return Err(Fault::refused(format!("nothing was measured at {:.3} {:.3} mm", at[0], at[1]))
@@ -63,7 +64,7 @@ fn point_to_plane(map: &HeightMap, p: &Pointed, corners: &[f64; 4]) -> Result<Me
     let (height, sigma) = plane.at(p.place.x, p.place.y);
     let normal = plane.normal();
     let distance = (p.place.z - height) * normal.z;
-    // Of the point along the normal, of the plane under it along the same.
+    // Variance of the point along the normal, and of the plane below it along the normal.
     let variance = p.variance.dot(&normal.component_mul(&normal)) + (sigma * normal.z).powi(2);
     let slopes = plane.coefficients.fixed_rows::<2>(1).into_owned();
     let steep = slopes.norm();
@@ -103,8 +104,8 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, Normal};
 
-    /// A plate that rises by 0.1 a mm along x, with a step of 5 mm beyond x = 20, heights noisy by 0.02 mm as they
-    /// state.
+    /// A plate that rises by 0.1 mm per mm along x, with a step of 5 mm beyond x = 20. The noise of the heights is
+    /// 0.02 mm, as they state.
     fn map(seed: u64) -> HeightMap {
         let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
         let noise = Normal::new(0.0, 0.02).unwrap();
@@ -121,8 +122,8 @@ mod tests {
     #[test]
     fn distances_from_a_plane_scatter_as_they_state() {
         let ask = Measure::PointToPlane(PlaneAsk { point: [30.0, 10.1], plane: [1.0, 1.0, 19.0, 19.0] });
-        // Over the carried-on slope, along its normal; the place stands for its cell, which rises by half a cell's
-        // slope.
+        // Above the extended slope, along its normal. The point represents its cell, whose centre is higher by half
+        // a cell times the slope.
         let steep = 1.01f64.sqrt();
         let (mut sum, mut stated) = (0.0, 0.0);
         for seed in 0..400 {
@@ -132,7 +133,8 @@ mod tests {
             assert!((a.tilt.unwrap().value - 0.1f64.atan().to_degrees()).abs() < 0.1);
         }
         let scatter = (sum / 400.0).sqrt();
-        // In these cells the place in the plane is known, in the statement it is not: 0.5 mm / sqrt 12 times the slope.
+        // Here the point's position in the plane is exact, but its stated variance includes 0.5 mm / sqrt 12 times
+        // the slope.
         let in_plane = 0.5 / 12f64.sqrt() * 0.1 / steep;
         let expected = (stated * stated - in_plane * in_plane).sqrt();
         assert!((0.85..1.15).contains(&(scatter / expected)), "{scatter} against {expected}");

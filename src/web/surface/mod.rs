@@ -1,6 +1,5 @@
-//! In: a height map or a cloud of a finished scan, places a person pointed at. Out: sections, distances and points to
-//! look at.
-//! Frame and unit: grid frame, mm; each number with its standard deviation.
+//! In: a height map or a cloud of a finished scan, selected points. Out: sections, distances, and points to view.
+//! Frame and unit: grid frame, mm; each value with its standard deviation.
 
 mod fit;
 mod look;

@@ -1,5 +1,5 @@
-//! In: a recipe whose part was found, two places that were pointed at on the height map. Out: the same recipe with
-//! the tool where the two named shapes nearest to them say.
+//! In: a recipe whose part was found, two positions selected on the height map. Out: the same recipe with the tool
+//! at the middle of the two nearest named shapes.
 //! Frame and unit: grid frame of the map, part frame; mm.
 
 use crate::fault::{Fault, Result};
@@ -7,15 +7,15 @@ use crate::find::Recipe;
 use crate::find::measure::construct::{Build, Construction};
 use crate::geometry::{Grid, Part, Rigid, Vec3};
 
-/// What the recipe calls the middle of the two.
+/// The recipe's name for the middle of the two shapes.
 const BETWEEN: &str = "between two pins";
-/// A finger misses a shape by so much, mm, where its neighbours leave it room.
+/// Largest distance between a selected position and the nearest shape, mm: a finger on the screen is not exact.
 const FINGER: f64 = 1.5;
 
-/// Puts the tool where the middle of the two shapes says; a lattice of the recipe still has to agree with it.
+/// Puts the tool at the middle of the two shapes; a lattice in the recipe must still agree with it.
 ///
 /// # Errors
-/// A recipe that names no shapes, a place beside all of them, the same one twice.
+/// A recipe without named shapes, a position away from all of them, the same shape twice.
 pub fn between_pins(recipe: &Recipe, grid_from_part: &Rigid<Grid, Part>, places: &[[f64; 2]; 2]) -> Result<Recipe> {
     let [a, b] = [nearest(recipe, grid_from_part, &places[0])?, nearest(recipe, grid_from_part, &places[1])?];
     if a == b {
@@ -30,7 +30,7 @@ pub fn between_pins(recipe: &Recipe, grid_from_part: &Rigid<Grid, Part>, places:
     Ok(out)
 }
 
-/// The named shape nearest to a place.
+/// The named shape nearest to a position.
 fn nearest(recipe: &Recipe, grid_from_part: &Rigid<Grid, Part>, place: &[f64; 2]) -> Result<String> {
     let drawing = recipe.drawing();
     let named = drawing.shape.iter().enumerate().filter_map(|(i, s)| Some((i, s, s.name.as_ref()?)));
@@ -69,7 +69,7 @@ mod tests {
         Recipe::parse(include_str!("../../../data/recipes/led.toml")).unwrap()
     }
 
-    /// The part, turned by 30 degrees about its own place.
+    /// The part, rotated by 30 degrees about its datum.
     fn lies() -> Rigid<Grid, Part> {
         Rigid::from_vectors(&Vec3::new(0.0, 0.0, 30f64.to_radians()), Vec3::new(40.0, 25.0, 3.0))
     }
@@ -92,7 +92,7 @@ mod tests {
         let last = made.construction.last().unwrap();
         assert_eq!((last.of.clone(), made.insertion.construction.as_str()), (vec![a, b], BETWEEN));
         assert_eq!(made.insertion.lattice, recipe.insertion.lattice, "the lattice is still compared with");
-        // Asked again for other pins, it goes there instead.
+        // With other pins, the tool goes to their middle instead.
         let again = between_pins(&made, &lies(), &[places[1], places[0]]).unwrap();
         assert_eq!(again.construction.len(), made.construction.len());
         assert!(between_pins(&recipe, &lies(), &[places[0]; 2]).unwrap_err().what.contains("both places are"));

@@ -1,5 +1,5 @@
-//! In: a height map, a line over it, pieces of that line. Out: heights along it, straight lines through the pieces,
-//! the step and the angle between them.
+//! In: a height map, a line over it, pieces of that line. Out: heights along it, straight lines fitted to the
+//! pieces, the step and the angle between them.
 //! Frame and unit: grid frame, mm, degrees.
 
 use super::fit::Surface;
@@ -7,11 +7,11 @@ use crate::fault::{Fault, Result};
 use crate::scan::HeightMap;
 use crate::web::message::{Distance, Fit, Section, SectionAsk, SectionPoint};
 
-/// Most places of a section; a longer one has them farther apart.
+/// Most points of a section; in a longer one they are farther apart.
 const MOST: usize = 8192;
 
-/// Samples the map each half cell. Errors: a line of no length, numbers that are not finite, more than two pieces or
-/// pieces with fewer than two cells.
+/// Samples the map at every half cell. Returns an error for a line shorter than a cell, numbers that are not
+/// finite, more than two pieces, or pieces with fewer than two cells.
 pub fn section(map: &HeightMap, ask: &SectionAsk) -> Result<Section> {
     let [dx, dy] = [ask.to[0] - ask.from[0], ask.to[1] - ask.from[1]];
     let length = dx.hypot(dy);
@@ -43,7 +43,8 @@ pub fn section(map: &HeightMap, ask: &SectionAsk) -> Result<Section> {
     Ok(Section { length_mm: length, points, fits, step, angle })
 }
 
-/// Height and standard deviation of the cell that holds a place; none beside the map, and of what is no number.
+/// Height and standard deviation of the cell that contains a point; `None` outside the map, and for coordinates
+/// that are not finite.
 pub(super) fn cell_at(map: &HeightMap, x: f64, y: f64) -> Option<(f64, f64)> {
     if !(x.is_finite() && y.is_finite()) {
         return None;
@@ -53,7 +54,7 @@ pub(super) fn cell_at(map: &HeightMap, x: f64, y: f64) -> Option<(f64, f64)> {
     Some((f64::from(z), f64::from(map.sigma[iy as usize * map.width as usize + ix as usize])))
 }
 
-/// The line through the cells under a piece: each cell once, however often the section samples it.
+/// The line through the cells below a piece; each cell counts once, however often the section samples it.
 fn line(map: &HeightMap, ask: &SectionAsk, piece: &[f64; 2], length: f64) -> Result<Surface> {
     let (from, to) = (piece[0].min(piece[1]).max(0.0), piece[0].max(piece[1]).min(length));
     let along = [(ask.to[0] - ask.from[0]) / length, (ask.to[1] - ask.from[1]) / length];
@@ -68,7 +69,7 @@ fn line(map: &HeightMap, ask: &SectionAsk, piece: &[f64; 2], length: f64) -> Res
             continue;
         }
         if let Some((z, sigma)) = cell_at(map, x, y) {
-            // Where along the section the cell's own middle lies.
+            // Position of the cell's centre along the section.
             let middle =
                 [(here.0 as f64 + 0.5) * map.cell - ask.from[0], (here.1 as f64 + 0.5) * map.cell - ask.from[1]];
             places.push([middle[0] * along[0] + middle[1] * along[1], 0.0, z, sigma]);
@@ -94,7 +95,7 @@ fn described(piece: [f64; 2], l: &Surface) -> Fit {
     }
 }
 
-/// From the first line, carried on, to the middle of the second piece, at right angles to the first.
+/// From the first line, extended, to the middle of the second piece, at right angles to the first.
 fn step(a: &Surface, b: &Surface) -> Distance {
     let (height, sigma) = a.at(b.middle[0], 0.0);
     let steep = 1.0 / (1.0 + a.coefficients[1].powi(2)).sqrt();

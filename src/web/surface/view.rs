@@ -1,22 +1,21 @@
-//! In: a cloud on disk. Out: as many of its points as a view can show, evenly taken, small enough to send.
-//! Frame and unit: the cloud's frame, mm, less the stated origin.
+//! In: a cloud on disk. Out: a uniformly spread subset of its points, small enough to send and to display.
+//! Frame and unit: the cloud's frame, mm, relative to the stated origin.
 
 use crate::fault::Result;
 use crate::scan::{CloudPoint, PointSource};
 
-/// Points to look at.
+/// Points to display.
 pub struct CloudView {
-    /// Of the whole cloud.
+    /// Number of points in the whole cloud.
     pub all: u64,
-    /// What the coordinates are relative to, mm.
+    /// Origin of the coordinates, mm.
     pub origin: [f64; 3],
     /// x, y, z, sigma_mm and intensity of each point.
     pub points: Vec<[f32; 5]>,
 }
 
-/// Takes at most `most` points, of those that `stays` lets stay. They are spread by a golden step over the scan, so
-/// that every share of them from the start on covers all of it: a page that shows the first tenth shows the whole
-/// part, coarsely.
+/// Takes at most `most` of the points that `stays` accepts. They are reordered by a golden-section step, so that
+/// any leading fraction covers the whole scan. A page that shows the first tenth shows the whole part, coarsely.
 pub fn view(cloud: &impl PointSource, all: u64, most: usize, stays: &dyn Fn(&glam::Vec3) -> bool) -> Result<CloudView> {
     let every = all.div_ceil(most.max(1) as u64).max(1);
     let mut taken: Vec<CloudPoint> = Vec::with_capacity((all / every) as usize + 1);
@@ -40,7 +39,7 @@ pub fn view(cloud: &impl PointSource, all: u64, most: usize, stays: &dyn Fn(&gla
     Ok(CloudView { all, origin, points: (0..taken.len()).map(at).collect() })
 }
 
-/// A step near the golden section of `n` that meets every place once.
+/// A step near the golden section of `n` that visits every index once.
 fn coprime(n: usize) -> usize {
     let gcd = |mut a: usize, mut b: usize| {
         while b > 0 {

@@ -1,5 +1,5 @@
-//! Checks the station and this machine, a line each. The GPU's stages run in a process of their own, because a driver
-//! can end it.
+//! Checks the station and this machine, one line per check. The GPU stages run in a separate process, because a
+//! driver can end a process.
 
 use super::run::Run;
 use crate::camera::{Intrinsics, Readout};
@@ -13,9 +13,9 @@ use std::io::Read;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-/// Older than this a calibration should be looked at again, days.
+/// Age from which a calibration should be checked again, days.
 const OLD: f64 = 90.0;
-/// Less than this is said, GB.
+/// Free disk space below which a warning is given, GB.
 const LITTLE_DISK: f64 = 5.0;
 
 pub(super) fn check(this: &Run) -> Result<Outcome> {
@@ -69,7 +69,7 @@ fn station(this: &Run, add: &mut impl FnMut(&str, &str, &str, String)) {
     }
 }
 
-/// What the camera sends, against the pictures that it was calibrated with.
+/// Compares the camera's pictures with those that it was calibrated with.
 fn camera(
     camera: Option<&Camera>,
     calibrated: Option<&Calibration<Intrinsics>>,
@@ -91,7 +91,7 @@ fn camera(
     add("camera", "picture size", state, says);
 }
 
-/// Whether pictures of this size, read from the sensor like this, can be measured with the calibration.
+/// Whether pictures of this size and sensor readout can be measured with the calibration.
 fn picture_size(
     calibrated: Option<&Calibration<Intrinsics>>,
     size: [u32; 2],
@@ -109,8 +109,8 @@ fn picture_size(
     }
 }
 
-/// What the controller says of itself; its reported pose is that of the flange in the base, or poses mean something
-/// else.
+/// State of the controller. Tool frame and work frame must be 0, so that the reported pose is that of the flange in
+/// the base; otherwise poses mean something else.
 fn robot(robot: Option<&Robot>, add: &mut impl FnMut(&str, &str, &str, String)) {
     let Some(robot) = robot else {
         return add("robot", "robot", "absent", "the screen was served without --robot".into());
@@ -142,7 +142,7 @@ fn robot(robot: Option<&Robot>, add: &mut impl FnMut(&str, &str, &str, String)) 
     }
 }
 
-/// What `sheetlight doctor` finds, asked of this same program.
+/// Results of `sheetlight doctor`, run with this program's executable.
 fn gpu(this: &Run) -> Result<Vec<(String, &'static str, String)>> {
     #[derive(serde::Deserialize)]
     struct Stage {
@@ -191,7 +191,7 @@ fn no_check(e: std::io::Error) -> Fault {
         .next("start the server again, or run `sheetlight doctor` in a terminal")
 }
 
-/// What a process prints; it is ended when the job is.
+/// Output of a process; the process is ended when the job is.
 fn finish(this: &Run, mut child: Child) -> Result<String> {
     let mut out = child.stdout.take().expect("piped");
     let read = move || {
@@ -228,7 +228,7 @@ mod tests {
         assert_eq!(state([w, h], None).0, "good");
         let (part, says) = state([w / 2, h / 2], Some(&region));
         assert!(part == "good" && says.contains(&format!("offset {}", w / 4)), "{part} {says}");
-        // The calibrated aspect alone says nothing of what is shown: it may be a crop.
+        // The calibrated aspect ratio alone does not show what part of the sensor is read: it may be a crop.
         assert_eq!(state([w / 2, h / 2], None).0, "bad");
         let beyond = Readout { offset_px: [w, h], ..region };
         assert_eq!(state([w / 2, h / 2], Some(&beyond)).0, "bad");

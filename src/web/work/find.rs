@@ -1,4 +1,5 @@
-//! In: finished scans, a recipe or a few places of a part. Out: where the tool goes, as the page Position shows it.
+//! In: finished scans, a recipe or a few positions of a part. Out: the tool's poses, as the page Position shows
+//! them.
 //! Frame and unit: the scan's frame, outlines in the height map's grid; mm, degrees.
 
 use super::found::{FOUND, RECIPE};
@@ -68,7 +69,7 @@ fn scan_folders(this: &Run, scans: &[String]) -> Result<Vec<PathBuf>> {
     scans.iter().map(|id| scan_of(&this.jobs.place.jobs(), &this.jobs.get(id)?)).collect()
 }
 
-/// Report, picture and the recipe as it was then: what is edited later changes nothing in them.
+/// Stores report, picture and the recipe used; later edits of the recipe do not change them.
 fn keep(this: &Run, report: &Report, recipe: &Recipe, picture: &RgbImage) -> Result<()> {
     let text = serde_json::to_string_pretty(report).expect("plain data");
     let recipe = toml::to_string(recipe).expect("plain data");
@@ -128,7 +129,7 @@ pub(super) fn labels(c: Convention) -> Vec<String> {
     c.labels().iter().map(|l| (*l).to_owned()).collect()
 }
 
-/// The drawing where the part was measured.
+/// Outlines of the drawing at the measured pose of the part.
 fn outline(r: &Report, recipe: &Recipe) -> Vec<Vec<[f64; 2]>> {
     let grid_from_part = r.map.base_from_grid.inverse() * r.base_from_part;
     let place = |p: &[f64; 2]| {

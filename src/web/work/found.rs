@@ -1,4 +1,4 @@
-//! In: a job that found a part, finished or still under way. Out: where the part lies and its recipe as it was then.
+//! In: a job that found a part, finished or running. Out: the part's pose, and its recipe as it was then.
 //! Frame and unit: the scan's frame, mm.
 
 use super::jobs::Jobs;
@@ -10,15 +10,15 @@ use crate::station::Lies;
 use crate::web::message::{Job, Order};
 use std::path::PathBuf;
 
-/// The job's own copy of its recipe: what is edited meanwhile changes nothing in it.
+/// The job's copy of its recipe; later edits of the recipe do not change it.
 pub(super) const RECIPE: &str = "recipe.toml";
-/// What was found.
+/// The report of the found part.
 pub(super) const FOUND: &str = "found.json";
 
-/// The file that says where a job found its part.
+/// The file with the pose that a job found.
 ///
 /// # Errors
-/// A job that looks for none.
+/// The job does not find parts.
 pub fn report_of(jobs: &Jobs, job: &Job) -> Result<PathBuf> {
     let folder = jobs.folder(job);
     match job.order {
@@ -28,7 +28,7 @@ pub fn report_of(jobs: &Jobs, job: &Job) -> Result<PathBuf> {
     }
 }
 
-/// The folder of an insertion's own state.
+/// The folder of an insertion's state.
 ///
 /// # Errors
 /// No such job, or another procedure.
@@ -40,10 +40,10 @@ pub fn insertion_of(jobs: &Jobs, id: &str) -> Result<PathBuf> {
     }
 }
 
-/// Where the part lies, and what it is.
+/// The part's pose, and its recipe.
 ///
 /// # Errors
-/// Nothing was found yet; a job of a former version whose recipe is gone.
+/// Nothing was found yet; a job of an earlier version whose recipe is missing.
 pub fn lies(jobs: &Jobs, job: &Job) -> Result<(Lies, Recipe)> {
     let path = report_of(jobs, job)?;
     if !path.is_file() {

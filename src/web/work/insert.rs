@@ -15,7 +15,7 @@ use crate::station::job::{Job, JobOptions, Outcome as Ended};
 use crate::web::message::{InsertOrder, Inserted, Outcome};
 use crate::web::motion::{Person, Session};
 
-/// Steps in their order, as the machine names them.
+/// Steps in their order, as the state machine names them.
 const STEPS: [&str; 5] = ["touch", "scan", "approach", "insert", "retract"];
 /// Largest angle between the touched board and the found part, degrees.
 const MAX_TILT_DEG: f64 = 3.0;

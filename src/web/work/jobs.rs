@@ -1,5 +1,5 @@
-//! In: orders, and what becomes of them. Out: the list of jobs, on disk before anybody is told.
-//! Frame and unit: none; at most so many jobs as the limit says.
+//! In: orders, and the results of jobs. Out: the list of jobs; a change is on disk before viewers are notified.
+//! Frame and unit: none.
 
 use super::place::Place;
 use super::store::{self, FORMAT, number_of};
@@ -13,26 +13,26 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-/// Jobs that wait.
+/// Most jobs that wait.
 const MOST_WAITING: usize = 32;
-/// Pages are told of progress this often at most: a browser without a GPU spends 10 ms of a core on each frame,
+/// Shortest interval between progress events: a browser without a GPU spends 10 ms of a core on each frame,
 /// whatever changed in it.
 const TOLD: Duration = Duration::from_millis(500);
 
 /// All jobs of a station.
 pub struct Jobs {
-    /// Where things lie.
+    /// Folders of the station.
     pub place: Place,
-    /// Who is told.
+    /// The viewers to notify.
     pub hub: Arc<Hub>,
-    /// What moves the robot, and who confirms it.
+    /// The robot's motions, and their confirmation.
     pub desk: Arc<Desk>,
-    /// Frames of the scan that runs, or of the last one.
+    /// Frames of the running scan, or of the last one.
     pub frames: Mutex<Frames>,
-    /// Whoever changes a record on the disk holds the pen, so that two changes of one job come one after the other.
-    /// It is taken before the state, and may be held for as long as the disk takes.
+    /// Held while a record on the disk is changed, so that two changes of one job do not overlap. It is taken
+    /// before the state, and may be held for as long as the disk takes.
     pen: Mutex<()>,
-    /// Memory alone: nobody reads or writes the disk while he holds it. STOP waits for it.
+    /// In memory only: nobody reads or writes the disk while holding it, because STOP waits for it.
     state: Mutex<State>,
     wake: Condvar,
 }
@@ -41,7 +41,7 @@ struct State {
     all: BTreeMap<u32, Arc<Job>>,
     waiting: VecDeque<u32>,
     running: Option<Running>,
-    /// Presses of STOP so far: an order that was being written when it was pressed is stopped too.
+    /// Number of STOP presses so far: an order that is being written during one is stopped too.
     stops: u64,
     closing: bool,
 }
@@ -53,7 +53,7 @@ struct Running {
 }
 
 impl State {
-    /// A job that waited is stopped.
+    /// Marks a waiting job as stopped.
     fn stopped(&mut self, number: u32) -> Option<Job> {
         let job = Arc::make_mut(self.all.get_mut(&number)?);
         (job.state, job.resumable) = (JobState::Stopped, true);
@@ -61,14 +61,14 @@ impl State {
     }
 }
 
-/// What the worker takes up.
+/// A job that the worker takes.
 pub(super) struct Taken {
     pub job: Job,
     pub stop: Arc<AtomicBool>,
 }
 
 impl Jobs {
-    /// Reads what there is.
+    /// Reads the stored jobs.
     pub fn open(place: Place, hub: Arc<Hub>, desk: Arc<Desk>) -> Result<Arc<Jobs>> {
         let all = store::load(&place.jobs())?;
         let all = all.into_iter().map(|(number, job)| (number, Arc::new(job))).collect();
@@ -98,7 +98,7 @@ impl Jobs {
         some.iter().map(|job| Job::clone(job)).collect()
     }
 
-    /// One of them.
+    /// A job by its name.
     pub fn get(&self, id: &str) -> Result<Job> {
         let found = number_of(id).and_then(|n| self.state().all.get(&n).filter(|j| j.id == id).cloned());
         found.map(|job| Job::clone(&job)).ok_or_else(|| {
@@ -108,18 +108,18 @@ impl Jobs {
         })
     }
 
-    /// The job that runs.
+    /// The running job.
     pub fn running(&self) -> Option<String> {
         let state = self.state();
         state.running.as_ref().and_then(|r| state.all.get(&r.number)).map(|j| j.id.clone())
     }
 
-    /// A job's own folder.
+    /// A job's folder.
     pub fn folder(&self, job: &Job) -> PathBuf {
         self.place.jobs().join(&job.id)
     }
 
-    /// Takes an order. Errors: too many wait; the disk.
+    /// Accepts an order. Returns an error if too many jobs wait, or if the record cannot be written.
     pub fn order(&self, order: Order) -> Result<Job> {
         let _pen = self.pen();
         let state = self.state();
@@ -147,9 +147,9 @@ impl Jobs {
         self.queue(job, stops)
     }
 
-    /// Goes on with a job that was cut off or stopped; `back_out`: an insertion goes back up instead.
+    /// Resumes a job that was cut off or stopped; `back_out`: an insertion retracts instead.
     pub fn resume(&self, id: &str, back_out: bool) -> Result<Job> {
-        // Looked at and queued under one pen: a request that comes twice queues the job once.
+        // Checked and queued under one lock, so that a repeated request queues the job once.
         let _pen = self.pen();
         let stops = self.state().stops;
         let mut job = self.get(id)?;
@@ -170,8 +170,8 @@ impl Jobs {
         self.queue(job, stops)
     }
 
-    /// Writes a job's record and lets it wait its turn; the caller holds the pen. Where STOP was pressed since `stops`
-    /// was read it is stopped instead.
+    /// Writes a job's record and queues it; the caller holds the pen. If STOP was pressed since `stops` was read,
+    /// the job is stopped instead.
     fn queue(&self, mut job: Job, stops: u64) -> Result<Job> {
         store::save(&self.place.jobs(), &job)?;
         let number = number_of(&job.id).expect("a job's id");
@@ -191,8 +191,8 @@ impl Jobs {
         Ok(job)
     }
 
-    /// STOP: what runs ends, what waits is stopped, at once and in memory; what they did is kept. Gives the names of
-    /// those whose records are to be written ([`Jobs::keep`]).
+    /// STOP: ends the running job and stops the waiting ones, at once and in memory; finished steps stay stored.
+    /// Returns the names of those whose records must be written ([`Jobs::keep`]).
     pub fn stop_all(&self) -> Vec<String> {
         let mut state = self.state();
         state.stops += 1;
@@ -202,13 +202,13 @@ impl Jobs {
         let waiting = std::mem::take(&mut state.waiting);
         let stopped: Vec<Job> = waiting.into_iter().filter_map(|number| state.stopped(number)).collect();
         drop(state);
-        // After the flag: a job that takes the robot only now sees it.
+        // After the flag is set, so that a job that takes the robot only now sees it.
         self.desk.stop();
         stopped.iter().for_each(|job| self.tell(job));
         stopped.into_iter().map(|job| job.id).collect()
     }
 
-    /// Stops a job that runs or waits, in the same way; what it did is kept.
+    /// Stops a running or waiting job in the same way; finished steps stay stored.
     pub fn stop(&self, id: &str) -> Result<Job> {
         let job = self.get(id)?;
         let number = number_of(id).expect("a job's id");
@@ -229,8 +229,8 @@ impl Jobs {
         Ok(stopped)
     }
 
-    /// Writes jobs' records as they are in memory now. One that cannot be written says so; after a restart it counts as
-    /// cut off.
+    /// Writes jobs' records in their present state. If one cannot be written, the job reports that; after a restart
+    /// it counts as cut off.
     pub fn keep(&self, ids: &[String]) {
         let _pen = self.pen();
         for mut job in ids.iter().filter_map(|id| self.get(id).ok()) {
@@ -241,9 +241,9 @@ impl Jobs {
         }
     }
 
-    /// Takes a job and its files away; refused while it runs or waits.
+    /// Removes a job and its files. Returns an error while it runs or waits.
     pub fn remove(&self, id: &str) -> Result<()> {
-        // With the pen: nobody resumes it while its files go.
+        // Under the pen, so that nobody resumes the job while its files are removed.
         let _pen = self.pen();
         let job = self.get(id)?;
         if matches!(job.state, JobState::Running | JobState::Queued) {
@@ -256,7 +256,8 @@ impl Jobs {
         Ok(())
     }
 
-    /// Keeps a job's record and tells of it. Errors: it was taken away meanwhile; the disk.
+    /// Stores a job's record and notifies viewers. Returns an error if the job was removed meanwhile, or the record
+    /// cannot be written.
     pub(super) fn put(&self, job: &Job) -> Result<()> {
         let _pen = self.pen();
         self.get(&job.id)?;
@@ -265,7 +266,7 @@ impl Jobs {
         Ok(())
     }
 
-    /// Changes a job in memory and tells of it.
+    /// Changes a job in memory and notifies viewers.
     fn set(&self, job: &Job) {
         self.state().all.insert(number_of(&job.id).expect("a job's id"), Arc::new(job.clone()));
         self.tell(job);
@@ -275,7 +276,7 @@ impl Jobs {
         self.hub.tell(&Event::Job(Box::new(job.clone())));
     }
 
-    /// The next one that waits; waits for one; `None` when the program ends.
+    /// The next waiting job; blocks until there is one. `None` when the program ends.
     pub(super) fn take(&self) -> Option<Taken> {
         let mut state = self.state();
         loop {
@@ -283,7 +284,7 @@ impl Jobs {
                 return None;
             }
             if let Some(number) = state.waiting.pop_front() {
-                // A job whose folder vanished is not begun.
+                // A job that was removed meanwhile is skipped.
                 let Some(job) = state.all.get(&number).cloned() else { continue };
                 let stop = Arc::new(AtomicBool::new(false));
                 state.running = Some(Running { number, stop: stop.clone(), told: Instant::now() });
@@ -293,7 +294,7 @@ impl Jobs {
         }
     }
 
-    /// How far the running job is; in memory alone, because procedures keep their own checkpoints.
+    /// Records the progress of the running job, only in memory: procedures write their own checkpoints.
     pub(super) fn progress(&self, done: usize, of: Option<usize>) {
         let mut state = self.state();
         let Some(running) = &mut state.running else { return };
@@ -312,7 +313,7 @@ impl Jobs {
         }
     }
 
-    /// The running job ended.
+    /// Stores the result of the running job.
     pub(super) fn end(&self, mut job: Job, stopped: bool, ended: Result<Outcome>, seconds: f64) {
         let now = self.get(&job.id).unwrap_or_else(|_| job.clone());
         (job.done, job.of) = (now.done, now.of);
@@ -327,13 +328,13 @@ impl Jobs {
         }
         self.state().running = None;
         if let Err(fault) = self.put(&job) {
-            // The disk that the record belongs on is full or gone: those who look on hear it at least.
+            // The disk for the record is full or gone: at least the viewers are notified.
             (job.state, job.problem) = (JobState::Failed, Some(Problem::from(&fault)));
             self.set(&job);
         }
     }
 
-    /// Ends the worker: the job that runs is stopped and can be resumed.
+    /// Ends the worker: the running job is stopped and can be resumed.
     pub fn close(&self) {
         let mut state = self.state();
         state.closing = true;
@@ -341,7 +342,7 @@ impl Jobs {
             r.stop.store(true, Ordering::SeqCst);
         }
         drop(state);
-        // An output that is tried goes off before the program ends.
+        // Switches off an output that is being tried before the program ends.
         self.desk.stop();
         self.wake.notify_all();
     }
@@ -376,8 +377,8 @@ mod tests {
         assert_eq!(jobs.state().waiting.len(), 1);
     }
 
-    /// While somebody writes a record, for as long as the disk takes, STOP has acted and pages are answered. An order
-    /// that is being written then is stopped too.
+    /// STOP acts and pages are answered even while a record is being written, however long the disk takes. An order
+    /// that is being written is stopped too.
     #[test]
     fn stop_and_lists_do_not_wait_for_the_disk() {
         let dir = tempfile::tempdir().unwrap();
@@ -404,7 +405,7 @@ mod tests {
         assert!(of(&queued.id).contains("\"stopped\"") && of("0009-check").contains("\"stopped\""));
     }
 
-    /// Whoever resumes a job while another one takes it away: one of them is refused, and what is queued is there.
+    /// If a job is resumed and removed at the same time, one request fails, and a queued job exists.
     #[test]
     fn a_job_is_not_taken_away_while_it_is_resumed() {
         let dir = tempfile::tempdir().unwrap();

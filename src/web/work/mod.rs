@@ -1,5 +1,5 @@
-//! In: orders of an operator. Out: jobs that run one after the other on a thread of their own, kept on disk with
-//! their state.
+//! In: an operator's orders. Out: jobs that run one after the other on a separate thread, stored on disk with their
+//! state.
 //! Frame and unit: as the procedures; mm, degrees.
 
 mod calibrate;

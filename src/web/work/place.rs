@@ -1,4 +1,4 @@
-//! In: what the program was started with. Out: where a station's things lie.
+//! In: the program's start options. Out: the folders of a station.
 //! Frame and unit: none.
 
 use crate::web::message::Mode;
@@ -7,16 +7,16 @@ use std::path::PathBuf;
 /// Folders of one station.
 #[derive(Clone, Debug)]
 pub struct Place {
-    /// The station: station.toml and calibrations; jobs and recipes are written into it.
+    /// The station: station.toml and calibrations; jobs and recipes are stored in it.
     pub station: PathBuf,
-    /// Recordings lie below this.
+    /// Folder that contains the recordings.
     pub recordings: PathBuf,
-    /// Where pictures come from.
+    /// Source of the pictures.
     pub mode: Mode,
 }
 
 impl Place {
-    /// A folder a job.
+    /// Folder of the jobs, with one folder per job.
     pub fn jobs(&self) -> PathBuf {
         self.station.join("jobs")
     }

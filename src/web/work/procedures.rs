@@ -1,4 +1,4 @@
-//! In: an order. Out: the procedure of `station` that carries it out, and what it came to.
+//! In: an order. Out: its result, from the procedure of `station` that executes it.
 //! Frame and unit: as the procedures.
 
 use super::find::labels;
@@ -16,11 +16,11 @@ use crate::station::{RangeRun, Settings, measure_range};
 use crate::web::guard::resolve;
 use crate::web::message::{BenchRow, KeptUp, Order, Outcome, SquareProposed, SurfaceTouched, Touched};
 
-/// Pictures a second of a camera whose drops are counted, and for how long at each size.
+/// Frame rate of a camera whose drops are counted, Hz; and the duration at each size, s.
 const RATE_HZ: f64 = 30.0;
 const SECONDS: f64 = 2.0;
 
-/// Carries an order out.
+/// Executes an order.
 pub(super) fn run(this: &Run, order: &Order) -> Result<Outcome> {
     match order {
         Order::Check(_) => check::check(this),

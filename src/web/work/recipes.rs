@@ -1,5 +1,5 @@
-//! Lists, reads, stores and removes recipes: those that ship with the program and the station's own. Lengths are in mm,
-//! angles in degrees, in the part frame.
+//! Lists, reads, stores and removes recipes: those that ship with the program and those of the station. Lengths are
+//! in mm, angles in degrees, in the part frame.
 
 use super::place::Place;
 use crate::fault::{Fault, Result};
@@ -22,8 +22,8 @@ const SHIPPED: [(&str, &str); 4] = [
     ("osc", include_str!("../../../data/recipes/osc.toml")),
 ];
 
-/// All of them: the station's own first, in the order of their names; a station's own replaces a shipped one of that
-/// name. One that cannot be read stands in the list with what is wrong with it.
+/// All recipes: first the station's, sorted by name, then the shipped ones. A station's recipe replaces a shipped
+/// one of the same name. A recipe that cannot be read is listed with the reason.
 pub fn recipes(place: &Place) -> Vec<RecipeText> {
     let entries = std::fs::read_dir(place.recipes()).into_iter().flatten().flatten();
     let mut own: Vec<RecipeText> = entries.filter_map(|entry| of_file(&entry.path())).collect();
@@ -39,7 +39,7 @@ fn of_file(path: &Path) -> Option<RecipeText> {
     is_one.then(|| listed(&name, crate::files::read_text(path), false))
 }
 
-/// As the list shows it.
+/// A recipe's entry in the list.
 fn listed(name: &str, text: Result<String>, shipped: bool) -> RecipeText {
     let read = text.as_ref().map_err(Clone::clone).and_then(|text| Recipe::parse(text));
     let title = read.as_ref().map(|r| if r.title.is_empty() { &r.name } else { &r.title }).cloned();
@@ -52,7 +52,7 @@ fn listed(name: &str, text: Result<String>, shipped: bool) -> RecipeText {
     }
 }
 
-/// Where a station's own recipe lies. Errors: a name that is none.
+/// Path of a station's recipe. Returns an error for an invalid name.
 fn recipe_path(place: &Place, name: &str) -> Result<PathBuf> {
     if !plain(name) {
         return Err(Fault::usage(format!("{name:?} is an invalid recipe name"))
@@ -62,8 +62,8 @@ fn recipe_path(place: &Place, name: &str) -> Result<PathBuf> {
     Ok(place.recipes().join(format!("{name}.toml")))
 }
 
-/// Refuses a name under which the station has a recipe of its own, unless that one is to be replaced. A shipped recipe
-/// stays where one of its name is stored: it is there again when that one is taken away.
+/// Returns an error if the station has a recipe of this name, unless it is to be replaced. A shipped recipe of the
+/// same name stays, and is visible again when the station's recipe is removed.
 pub fn vacant(place: &Place, name: &str, replace: bool) -> Result<()> {
     if !replace && recipe_path(place, name)?.exists() {
         return Err(Fault::refused(format!("{name}: is a recipe of this station already"))
@@ -73,12 +73,12 @@ pub fn vacant(place: &Place, name: &str, replace: bool) -> Result<()> {
     Ok(())
 }
 
-/// Checks and stores one; what it replaces lies in a backup of the station.
+/// Checks and stores a recipe; one that it replaces goes into a backup of the station.
 pub fn save_recipe(place: &Place, name: &str, text: &str, replace: bool) -> Result<RecipeText> {
     let path = recipe_path(place, name)?;
     Recipe::parse(text)?;
     crate::files::make_folder(&place.recipes())?;
-    // Jobs store recipes too, while somebody saves one.
+    // Jobs may store recipes at the same time.
     let _lock = Lock::wait(&place.recipes(), "recipes")?;
     if !crate::files::read_text(&path).is_ok_and(|former| former == text) {
         vacant(place, name, replace)?;
@@ -90,7 +90,7 @@ pub fn save_recipe(place: &Place, name: &str, text: &str, replace: bool) -> Resu
     Ok(listed(name, Ok(text.into()), false))
 }
 
-/// Takes one of the station's own away; it lies in a backup of the station then.
+/// Removes a recipe of the station; a backup of the station keeps it.
 pub fn remove_recipe(place: &Place, name: &str) -> Result<()> {
     let path = recipe_path(place, name)?;
     if !path.is_file() {
@@ -103,10 +103,10 @@ pub fn remove_recipe(place: &Place, name: &str) -> Result<()> {
     crate::files::remove(&path).map_err(|e| Fault::write(&path, e))
 }
 
-/// A recipe's text with a constructed point more or less, or with another that the tool goes to.
+/// Adds, removes or selects a constructed point in a recipe's text.
 ///
 /// # Errors
-/// The text is no recipe, or cannot be changed so.
+/// The text is not a recipe, or the change is not possible.
 pub fn change_points(ask: &PointsChange) -> Result<PointsChanged> {
     let text = match &ask.change {
         PointChange::Add(point) => {
@@ -124,11 +124,10 @@ pub fn change_points(ask: &PointsChange) -> Result<PointsChanged> {
     Ok(PointsChanged { points: points(&text)?, text })
 }
 
-/// Every point by which a recipe's text can say where the tool goes: shapes with names, and what is constructed of
-/// them.
+/// All points that the tool can be sent to in a recipe's text: named shapes, and points constructed from them.
 ///
 /// # Errors
-/// The text is no recipe.
+/// The text is not a recipe.
 pub fn points(text: &str) -> Result<Vec<RecipePoint>> {
     let recipe = Recipe::parse(text)?;
     let drawing = recipe.drawing();
@@ -150,7 +149,7 @@ pub fn points(text: &str) -> Result<Vec<RecipePoint>> {
             });
         }
         if shape.grid.is_some() {
-            // A lattice is constructed of the whole grid.
+            // A lattice is constructed from the whole grid.
             out.push(RecipePoint {
                 name: name.clone(),
                 at: drawing.centre_of(i, 0),
@@ -167,7 +166,7 @@ pub fn points(text: &str) -> Result<Vec<RecipePoint>> {
     Ok(out)
 }
 
-/// Makes a recipe of a drawing and stores it.
+/// Makes a recipe from a drawing and stores it.
 pub fn from_drawing(place: &Place, ask: &DrawingAsk) -> Result<DrawingRead> {
     vacant(place, &ask.name, ask.replace)?;
     let unit = ask.unit.as_deref().map(str::parse::<Unit>).transpose();
@@ -187,7 +186,7 @@ pub fn from_drawing(place: &Place, ask: &DrawingAsk) -> Result<DrawingRead> {
     })
 }
 
-/// One of them, checked. No other recipe is looked at.
+/// Loads and checks a recipe, without reading any other.
 pub fn load(place: &Place, name: &str) -> Result<Recipe> {
     let path = recipe_path(place, name)?;
     if path.exists() {
@@ -215,7 +214,7 @@ mod tests {
         (dir, place)
     }
 
-    /// Texts of a recipe in the station's backups, in the order in which these were made.
+    /// Texts of a recipe in the station's backups, in the order of the backups.
     fn backed_up(place: &Place, name: &str) -> Vec<Option<String>> {
         let mut all: Vec<Backup> = std::fs::read_dir(backups(&place.station))
             .into_iter()
@@ -237,7 +236,7 @@ mod tests {
         save_recipe(&place, "mine", LED, false).unwrap();
         assert_eq!(save_recipe(&place, "mine", &other, false).unwrap_err().kind, crate::fault::Kind::Refused);
         assert_eq!((stored(&place, "mine"), backed_up(&place, "mine").len()), (LED.into(), 0));
-        // The same text again replaces nothing.
+        // Storing the same text again replaces nothing.
         save_recipe(&place, "mine", LED, false).unwrap();
         assert!(save_recipe(&place, "mine", "format = 1", true).is_err() && stored(&place, "mine") == LED);
         let saved = save_recipe(&place, "mine", &other, true).unwrap();
@@ -246,7 +245,7 @@ mod tests {
         remove_recipe(&place, "mine").unwrap();
         assert_eq!(backed_up(&place, "mine"), [Some(LED.into()), Some(other)]);
         assert!(remove_recipe(&place, "mine").is_err() && load(&place, "mine").is_err());
-        // A shipped one stays beside the station's own of its name.
+        // A shipped recipe is hidden while the station has one of its name.
         save_recipe(&place, "led", LED, false).unwrap();
         assert!(!recipes(&place).iter().any(|r| r.name == "led" && r.shipped));
         remove_recipe(&place, "led").unwrap();
@@ -297,7 +296,7 @@ mod tests {
         load(&place, "mine").unwrap();
         load(&place, "led").unwrap();
         assert!(load(&place, "bytes").unwrap_err().next.contains("UTF-8") && load(&place, "torn").is_err());
-        // It is backed up with the others, byte by byte, and comes back.
+        // It is backed up with the others, byte by byte, and can be restored.
         remove_recipe(&place, "bytes").unwrap();
         let made = std::fs::read_dir(backups(&place.station)).unwrap().next().unwrap().unwrap().path();
         Backup::load(&made).unwrap().restore(&place.station).unwrap();

@@ -1,4 +1,4 @@
-//! In: a job that was taken up. Out: what a procedure needs of it.
+//! In: a job taken by the worker. Out: what a procedure needs to run it.
 //! Frame and unit: none.
 
 use super::jobs::Jobs;
@@ -8,26 +8,26 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// One run of a procedure.
 pub(super) struct Run {
-    /// Of its station.
+    /// The jobs of its station.
     pub jobs: Arc<Jobs>,
-    /// Its name.
+    /// Name of the job.
     pub id: String,
-    /// Its number.
+    /// Number of the job.
     pub number: u32,
-    /// Its folder, made.
+    /// Folder of the job; it exists.
     pub folder: PathBuf,
-    /// It was begun before.
+    /// The job was started before.
     pub again: bool,
-    /// Set when it is to end.
+    /// Set when the run must end.
     pub stop: Arc<AtomicBool>,
 }
 
 impl Run {
-    /// Says how far it is.
+    /// Reports the progress.
     pub fn progress(&self, done: usize, of: Option<usize>) {
         self.jobs.progress(done, of);
     }
-    /// Whether it is to end.
+    /// Whether the run must end.
     pub fn stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }

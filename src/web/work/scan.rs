@@ -1,4 +1,4 @@
-//! In: a recording and settings. Out: its scan in the job's folder, watched by the pages while it grows.
+//! In: a recording and settings. Out: its scan in the job's folder; pages show it while it grows.
 //! Frame and unit: mm.
 
 use super::run::Run;
@@ -25,7 +25,7 @@ pub(super) fn scan(this: &Run, asked: &ScanOrder) -> Result<Outcome> {
         .parse()
         .map_err(|e: String| Fault::usage(e).next("choose one of them"))?;
     let out = this.folder.join("scan");
-    // A scan that ended before its first checkpoint begins anew.
+    // A scan that ended before its first checkpoint starts again.
     let resume = this.again && out.join("scan.part/progress.json").exists();
     let options = ScanOptions {
         place: place_to_run,
@@ -48,14 +48,14 @@ pub(super) fn scan(this: &Run, asked: &ScanOrder) -> Result<Outcome> {
     Ok(Outcome::Scan(Box::new(figures(report))))
 }
 
-/// A scan less what filters take away, in a job of its own.
+/// Stores a filtered copy of a scan in a separate job.
 pub(super) fn filter(this: &Run, asked: &FilterOrder) -> Result<Outcome> {
     let scan = scan_of(&this.jobs.place.jobs(), &this.jobs.get(&asked.scan)?)?;
     let filters: Vec<_> = asked.filters.iter().map(|f| (*f).into()).collect();
     Ok(Outcome::Scan(Box::new(figures(filter_scan(&scan, &filters, &this.folder.join("scan"))?))))
 }
 
-/// Counts frames and lets the pages' height map grow.
+/// Counts frames and extends the height map that pages show.
 fn watch(this: &Run, recording: &Recording, size: [u32; 2]) -> Watch {
     let shots = recording.meta.frames.iter().filter(|f| f.laser.is_some()).count();
     this.jobs.hub.growing.begin(this.number, shots);

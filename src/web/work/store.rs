@@ -1,4 +1,5 @@
-//! In: the folder of jobs. Out: each job's record, read and written whole; what ran when the program ended is cut off.
+//! In: the folder of jobs. Out: each job's record, read and written whole; a job that ran when the program ended is
+//! marked as cut off.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
@@ -7,10 +8,10 @@ use crate::web::message::{Job, JobState, Order};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Of job.json.
+/// Version of job.json.
 pub(super) const FORMAT: u32 = 1;
 
-/// The number in front of a job's id.
+/// The number at the start of a job's id.
 pub fn number_of(id: &str) -> Option<u32> {
     let (number, word) = id.split_once('-')?;
     let known =
@@ -18,7 +19,7 @@ pub fn number_of(id: &str) -> Option<u32> {
     number.parse().ok().filter(|_| known)
 }
 
-/// Reads all jobs. A folder whose record cannot be read is passed over: it may be another program's.
+/// Reads all jobs. A folder whose record cannot be read is skipped: it may belong to another program.
 pub(super) fn load(jobs: &Path) -> Result<BTreeMap<u32, Job>> {
     crate::files::make_folder(jobs)?;
     let mut all = BTreeMap::new();
@@ -32,7 +33,7 @@ pub(super) fn load(jobs: &Path) -> Result<BTreeMap<u32, Job>> {
         }
         if matches!(job.state, JobState::Running | JobState::Queued) {
             job.state = JobState::CutOff;
-            // A scan says itself whether something of it was kept.
+            // The procedure itself finds out which of its steps are stored.
             job.resumable = true;
             save(jobs, &job)?;
         }
@@ -41,7 +42,7 @@ pub(super) fn load(jobs: &Path) -> Result<BTreeMap<u32, Job>> {
     Ok(all)
 }
 
-/// Writes a job's record; its folder is made where it is missing.
+/// Writes a job's record; its folder is created if missing.
 pub(super) fn save(jobs: &Path, job: &Job) -> Result<()> {
     let folder = jobs.join(&job.id);
     crate::files::make_folder(&folder)?;
@@ -49,7 +50,7 @@ pub(super) fn save(jobs: &Path, job: &Job) -> Result<()> {
     crate::files::write(&folder.join("job.json"), text.as_bytes())
 }
 
-/// The scan folder of a job that scanned; refused for any other.
+/// The scan folder of a job. Returns an error if the job is not a finished scan.
 pub fn scan_of(jobs: &Path, job: &Job) -> Result<PathBuf> {
     if !matches!((&job.order, job.state), (Order::Scan(_) | Order::Filter(_), JobState::Done)) {
         return Err(Fault::usage(format!("{}: is not a finished scan", job.id))

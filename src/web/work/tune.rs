@@ -1,5 +1,5 @@
-//! In: the camera, a stripe in its pictures. Out: the exposure that suits it, set.
-//! Frame and unit: us, shares of full scale.
+//! In: the camera, a stripe in its pictures. Out: the exposure that suits the stripe; it is set.
+//! Frame and unit: us, fractions of full scale.
 
 use super::run::Run;
 use crate::arm::Switchboard;
@@ -10,10 +10,10 @@ use crate::station::Settings;
 use crate::web::message::{ExposureSet, Outcome, PictureLook};
 use crate::web::motion::Session;
 
-/// Tries at most, as progress shows them.
+/// Most tries, for the progress display.
 const TRIES: usize = 20;
 
-/// Where the robot is armed the line laser is lit for it.
+/// Sets the exposure. If the robot is armed, the line laser is switched on for it.
 pub(super) fn tune(this: &Run) -> Result<Outcome> {
     let desk = &this.jobs.desk;
     let camera = desk.links.camera.as_ref().ok_or_else(|| {

@@ -1,5 +1,5 @@
-//! In: jobs that wait. Out: the same, run one after the other on one thread; a panic in one of them ends that job
-//! alone.
+//! In: waiting jobs. Out: the same jobs, run one after the other on one thread. A panic in a job ends only that
+//! job.
 //! Frame and unit: seconds.
 
 use super::jobs::{Jobs, Taken};
@@ -13,14 +13,14 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Instant;
 
-/// The thread.
+/// The worker thread.
 pub struct Worker {
     jobs: Arc<Jobs>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Worker {
-    /// Starts it.
+    /// Starts the thread.
     pub fn start(jobs: Arc<Jobs>) -> Result<Worker> {
         let work = jobs.clone();
         let body = move || {
@@ -32,7 +32,7 @@ impl Worker {
         Ok(Worker { jobs, thread: Some(thread) })
     }
 
-    /// Stops the job that runs and waits for it.
+    /// Stops the running job and waits until it has ended.
     pub fn close(mut self) {
         self.jobs.close();
         if let Some(thread) = self.thread.take() {

@@ -1,4 +1,4 @@
-//! Whether docs/api.md and docs/operator.md state the numbers that the screen keeps.
+//! Tests that docs/api.md and docs/operator.md state the numbers that the screen uses.
 
 use crate::capture::PIECES;
 use crate::station::LIT;
@@ -8,7 +8,7 @@ use crate::web::guard::{IDLE, MOST_BODY};
 use crate::web::motion::{HELD, LONGEST, SILENCE};
 use std::time::Duration;
 
-/// A time as these texts say it.
+/// A time in the wording of these documents.
 fn spoken(time: Duration) -> &'static str {
     match time.as_millis() {
         800 => "most of a second",
@@ -19,7 +19,7 @@ fn spoken(time: Duration) -> &'static str {
     }
 }
 
-/// Fails where a document does not say one of these.
+/// Fails if a document lacks one of these texts.
 fn says(name: &str, document: &str, all: &[String]) {
     let text = document.split_whitespace().collect::<Vec<_>>().join(" ");
     all.iter().for_each(|says| assert!(text.contains(says), "{name} does not say: {says}"));

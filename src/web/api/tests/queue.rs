@@ -1,4 +1,4 @@
-//! What halts acts in its request's own thread: every thread for work that takes long sleeps here and never wakes.
+//! Requests that halt act in their own task: in this test every worker thread sleeps and never wakes.
 
 use crate::arm::rules::{Carried, Guard, MotionLog};
 use crate::web::api::{jobs, motion, session};
@@ -16,14 +16,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-/// So long waits nothing that acts before the queue; what waits in it waits for ever.
+/// Longest wait for a request that acts before the queue; a request in the queue waits without end.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn tab(name: &str) -> Tab {
     Tab { session: "s".into(), tab: name.into() }
 }
 
-/// A screen whose one thread for work that takes long sleeps.
+/// A screen whose only worker thread sleeps.
 fn asleep(what: impl AsyncFnOnce(Arc<Screen>)) {
     let dir = tempfile::tempdir().unwrap();
     let [station, recordings] = ["station", "recordings"].map(|name| dir.path().join(name));
@@ -54,7 +54,7 @@ fn stop_waits_for_no_other_work() {
         assert!(stopped.load(Ordering::SeqCst), "the job goes on");
         assert_eq!(screen.jobs.get(&waits.id).unwrap().state, JobState::Stopped);
         assert_eq!(screen.desk.state().look.as_deref(), Some("STOP was pressed"));
-        // Whatever is ordered from now on is another matter.
+        // Later orders are not affected.
         let later = screen.jobs.order(Order::Check(Plain {})).unwrap();
         assert_eq!(screen.jobs.get(&later.id).unwrap().state, JobState::Queued);
     });

@@ -1,5 +1,5 @@
 // In: paths and messages (docs/messages.d.ts). Out: answers; faults as errors with their four
-// sentences. One place that talks to the server.
+// sentences. Only this module talks to the server.
 
 const ROOT = "/api/v1";
 
@@ -126,7 +126,7 @@ export const listen = ({ event, rows, lost }) =>
         try {
           await get("/session");
         } catch (e) {
-          // Another start of the program: the address of this one is no good any more.
+          // The program was restarted: this page's address is no longer valid.
           if (e.status === 401) return lost("over");
         }
         setTimeout(open, (wait = Math.min(wait * 1.6, 5000)));

@@ -152,7 +152,7 @@ async function start() {
   const told = listen({ event: take, rows: takeRows, lost });
   addEventListener("hashchange", page);
   addEventListener("keydown", keys);
-  // Touching the screen keeps the lease; a screen that nobody touches loses it after a minute.
+  // Touching the screen renews the lease; a screen that nobody touches loses it after a minute.
   let touched = 0;
   const touch = () => {
     if (store.bar?.lease.holder === tab.slice(0, 4) && Date.now() - touched > 15000) {

@@ -1,4 +1,4 @@
-// In: names, properties, children. Out: elements; text is text, never markup.
+// In: names, properties, children. Out: elements; strings become text, never markup.
 
 /**
  * @template {keyof HTMLElementTagNameMap} T

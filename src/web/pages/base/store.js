@@ -1,5 +1,5 @@
-// In: events of the server. Out: bar, jobs and growing map as they stand, and word of each change
-// to whoever asked for it.
+// In: events of the server. Out: the present bar, jobs and growing map; listeners are called at
+// each change.
 
 /** @typedef {import("../../../../docs/messages").Bar} Bar */
 /** @typedef {import("../../../../tools/pages/types").AnyJob} Job */

@@ -1,5 +1,5 @@
-// In: an English text. Out: the same in the screen's language, from one table; English where the
-// table has none.
+// In: an English text. Out: its translation into the screen's language, from one table; English
+// if the table has none.
 
 import { TABLE } from "./texts.js";
 

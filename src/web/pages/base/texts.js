@@ -1,4 +1,4 @@
-// The one table of texts: English, then German, Chinese, Japanese.
+// The only table of texts: English, then German, Chinese, Japanese.
 
 export const TABLE = {
   "1280×960 is twice the resolution of 640×480. Other machines as they were recorded with one clean stripe.":

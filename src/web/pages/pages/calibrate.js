@@ -1,5 +1,5 @@
-// Calibrate: a target, a recording, or everything at once by moves of the robot; residuals a
-// picture; old against new; accept.
+// Calibrate: one target from a recording, or everything at once with motions of the robot;
+// residual of each picture; the new calibration beside the old one; accept.
 
 import { get, picture, post, url } from "../base/api.js";
 import { fill, h, num, svg } from "../base/dom.js";

@@ -1,5 +1,5 @@
-// Health: where a scan's time went, what this machine can do at full and at half resolution, a file
-// for somebody who helps.
+// Health: where a scan's time went, what this machine can do at full and at half resolution, a
+// support file.
 
 import { url } from "../base/api.js";
 import { fill, h, num } from "../base/dom.js";
@@ -72,8 +72,8 @@ export async function show(place, query) {
     const fits = (ms) => `${num(1000 / ms, 0)} ${t("pictures a second")}`,
       { rows } = last.outcome,
       mine = new Set(rows.map((r) => r.on));
-    // What a camera of so many pictures a second sends beyond what is measured is passed over, and
-    // counted.
+    // Pictures that a camera of this frame rate sends faster than they can be measured are
+    // skipped and counted.
     const drops = (ms) => {
       const share = Math.max(0, 1 - 1000 / ms / rate);
       return h("span", { class: share ? "bad-ink" : "good-ink" }, `${num(100 * share, 0)} %`);

@@ -1,4 +1,4 @@
-// Part: choose or teach a recipe, find it in a scan, see where it lies.
+// Part: choose or teach a recipe, find its part in a scan, see the part's pose.
 
 import { get, put, remove, url } from "../base/api.js";
 import { all, fill, h, num } from "../base/dom.js";

@@ -1,6 +1,6 @@
-// Picture: the camera's newest picture with its peaks by fate, or a recording's, to the pixel;
-// levels and how much of them is saturated; the stripe along its length; region and exposure by
-// handle.
+// Picture: the camera's newest picture, or one of a recording, with its peaks by `fate`, at pixel
+// resolution; grey levels and saturated fraction; the stripe along its length; controls for
+// region and exposure.
 
 import { bytes, get, picture } from "../base/api.js";
 import { fill, h, num, svg } from "../base/dom.js";
@@ -174,7 +174,7 @@ export async function show(place) {
           ),
         );
       await new Promise(requestAnimationFrame);
-      // Drawing takes its share of this machine, not what a scan needs: where it is slow, fewer
+      // Drawing must not take the processor time that a scan needs: on a slow machine fewer
       // pictures are shown, each the newest.
       const took = performance.now() - begun;
       const rest = busy()
@@ -201,8 +201,8 @@ export async function show(place) {
       return `u ${u}  v ${v}  ${u >= 0 && v >= 0 && u < width && v < height ? grey[v * width + u] : "–"}`;
     };
     view.picture(width, height, grey, reads);
-    // Figures are read by people: twice a second is enough of a live picture, and a job's time is
-    // dearer.
+    // People read the figures: for a live picture an update twice a second is enough, and less
+    // often while a job needs the machine.
     if (!r && performance.now() - counted < (busy() ? 2000 : 500)) return;
     counted = performance.now();
     const counts = new Uint32Array(64),

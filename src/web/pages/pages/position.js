@@ -1,5 +1,5 @@
 // Position: an insertion with the robot, each motion shown and confirmed by holding the button;
-// where the tool goes, how sure that is and why, which gates it met.
+// the tool's poses with their uncertainty and its sources, and the gates.
 
 import { get, post } from "../base/api.js";
 import { all, fill, h, num, svg } from "../base/dom.js";

@@ -1,5 +1,5 @@
-// Replay: every job; two scans side by side with their difference; the same recording again with
-// other settings; a table as CSV.
+// Replay: all jobs; two scans side by side with their difference; the same recording scanned
+// again with other settings; a table as CSV.
 
 import { bytes, get, post, remove } from "../base/api.js";
 import { fill, h, num, thousands } from "../base/dom.js";
@@ -144,7 +144,7 @@ export async function show(place) {
   const again = () =>
     attempt(async () => {
       let from = jobs((j) => j.id === b)[0];
-      // A filtered scan comes from one of a recording.
+      // A filtered scan was made from a scan of a recording.
       while (from?.order.procedure === "filter") from = jobs((j) => j.id === from.order.scan)[0];
       const job = await order({ ...from.order, settings: { ...from.order.settings, ...changes } });
       follows();

@@ -1,4 +1,4 @@
-// Scan: a recording becomes a cloud; its height map grows line by line.
+// Scan: makes a cloud from a recording; its height map grows line by line.
 
 import { fill, h, num, thousands } from "../base/dom.js";
 import { jobs, on, store } from "../base/store.js";

@@ -1,5 +1,5 @@
-// Settings: language and colours; notation, limits and outputs of the station; its file as text;
-// folders, who may what; backups and the way back; outputs to try.
+// Settings: language and colours; pose convention, limits and outputs of the station; its file as
+// text; folders, permissions; backups and restoring them; outputs to try.
 
 import { get, post, put, url } from "../base/api.js";
 import { fill, h, num } from "../base/dom.js";

@@ -1,4 +1,4 @@
-// The station: what it is, what its calibrations are worth, and one list of checks.
+// Station: its settings, the quality of its calibrations, and one list of checks.
 
 import { get } from "../base/api.js";
 import { fill, h, num } from "../base/dom.js";

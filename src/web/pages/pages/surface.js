@@ -1,5 +1,5 @@
 // Surface: a scan's height, intensity and sigma; sections, distances, the cloud in three
-// dimensions, files to take away.
+// dimensions, files to download.
 
 import { post, url } from "../base/api.js";
 import { all, fill, h, num, withSigma } from "../base/dom.js";
@@ -100,7 +100,7 @@ export async function show(place, query) {
     },
     changed: async () => {
       await view.again();
-      // What was measured through other filters is not measured through these.
+      // Results measured with other filters do not apply any more.
       results.length = 0;
       list();
       view3?.end();

@@ -1,5 +1,5 @@
-// Touch: the pointer's spots on a surface: distances, its plane, its normal with sigma, how the
-// tool leant against it and how it stands square.
+// Touch: the pointer's spots on a surface: distances, the plane, its normal with sigma, the
+// tool's tilt relative to it and a square pose.
 
 import { fill, h, num, withSigma } from "../base/dom.js";
 import { done, store } from "../base/store.js";

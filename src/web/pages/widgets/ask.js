@@ -1,5 +1,5 @@
-// In: the motion that a job wants to make. Out: it is shown with its gates and its pose; holding
-// the button confirms it and moves for as long as it is held.
+// In: the motion that a job proposes. Out: the motion shown with its gates and its pose. Holding
+// the button confirms it; it moves only while the button is held.
 
 import { post, say, tab } from "../base/api.js";
 import { fill, h, num } from "../base/dom.js";
@@ -95,8 +95,8 @@ export function ask(place) {
     t("No"),
   );
   const what = () => ({ job: store.motion.asked.job, hash: store.motion.asked.hash });
-  // The hash that the button was pressed over, or was confirmed; one press goes on to a motion that
-  // may follow it.
+  // The hash that the button was pressed over, or that was confirmed; one press may continue to a
+  // following motion.
   let down = false,
     over = null,
     timer = 0,

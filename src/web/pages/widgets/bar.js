@@ -1,5 +1,5 @@
-// In: the bar's message. Out: the bar that never leaves: where pictures come from, robot, stop, who
-// operates, what is wrong.
+// In: the bar's message. Out: the bar that every page shows: source of the pictures, robot, stop,
+// the tab that operates, alarms.
 
 import { post, tab } from "../base/api.js";
 import { fill, h, num } from "../base/dom.js";
@@ -120,9 +120,9 @@ export function bar(place) {
   };
   on("bar", draw);
   on("lost", draw);
-  // How far a job is, is drawn with the rest of the bar, once a second: drawing it by itself costs
-  // two browsers on the station 1 % of two cores, which the job lacks. One that begins or ends is
-  // shown at once.
+  // A job's progress is drawn with the rest of the bar, once a second. Drawing it separately
+  // would cost two browsers on the station 1 % of two cores, which the job needs. A job that
+  // begins or ends is shown at once.
   on("jobs", () => {
     if (jobs((j) => j.state === "running")[0]?.id !== shown) work();
   });

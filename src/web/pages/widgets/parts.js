@@ -1,5 +1,5 @@
-// In: values. Out: what pages have in common: figures, tables, choices of recordings, scans and
-// recipes, a job's progress.
+// In: values. Out: elements that several pages use: figures, tables, choices of recordings, scans
+// and recipes, a job's progress.
 
 import { get, picture, post } from "../base/api.js";
 import { fill, h, num, thousands } from "../base/dom.js";
@@ -161,7 +161,7 @@ export function gallery(list, current, chosen) {
 export async function order(what) {
   if (!operating()) await operate(false);
   const job = await post("/jobs", what);
-  // A short job may have ended, and been told of over the socket, before this answer was read.
+  // A short job may have ended, and its event arrived over the socket, before this answer.
   if (!store.jobs.has(job.id)) store.jobs.set(job.id, job);
   return job;
 }

@@ -1,4 +1,4 @@
-// In: a fault. Out: its four sentences, where it happened or in a corner.
+// In: a fault. Out: its four sentences, shown where it happened or in a corner.
 
 import { fill, h } from "../base/dom.js";
 import { t } from "../base/text.js";

@@ -1,5 +1,5 @@
-// In: the station's settings. Out: fields for those that operators change; only what was changed is
-// said.
+// In: the station's settings. Out: fields for those that operators change; only changed ones are
+// sent.
 
 import { fill, h } from "../base/dom.js";
 import { t } from "../base/text.js";

@@ -1,5 +1,5 @@
-//! In: a board below an armed robot. Out: the whole rig by moves that the program chooses, each shown at the screen
-//! and confirmed; kept until it is accepted.
+//! In: a board below an armed robot. Out: calibrations of the whole rig, from motions that the program chooses.
+//! Each motion is shown at the screen and confirmed; the result is stored until it is accepted.
 //! Frame and unit: mm.
 
 use super::super::place::Place;
@@ -15,10 +15,10 @@ use crate::web::message::{AutoOrder, Outcome};
 use crate::web::motion::{Person, Session};
 use std::path::PathBuf;
 
-/// Stops at most where nobody says.
+/// Most stops if the order states none.
 const MOST: usize = 40;
 
-/// Names of the boards that the station has descriptions of.
+/// Names of the boards described in the station's folder.
 pub fn boards(place: &Place) -> Result<Vec<String>> {
     let entries = std::fs::read_dir(place.boards()).into_iter().flatten().flatten();
     let name = |e: std::fs::DirEntry| {
@@ -76,7 +76,8 @@ pub(in crate::web::work) fn auto(this: &Run, order: &AutoOrder) -> Result<Outcom
     Ok(Outcome::Auto(Box::new(keep(this, &result.joint, &mounted)?)))
 }
 
-/// Where this try's pictures go: one that was cut off keeps those that it has, and the next begins beside it.
+/// Folder for this attempt's pictures. An interrupted attempt keeps its pictures, and the next one uses another
+/// folder beside it.
 fn folder(this: &Run) -> PathBuf {
     let name = |k: usize| this.folder.join(if k == 0 { "pictures".into() } else { format!("pictures-{k}") });
     (0..).map(name).find(|f| !f.exists()).expect("some name is free")

@@ -1,5 +1,5 @@
 //! In: recordings of boards, or a board below an armed robot. Out: calibrations beside the station's present ones,
-//! kept until they are accepted.
+//! stored in the job's folder until they are accepted.
 //! Frame and unit: px, mm, degrees.
 
 mod auto;

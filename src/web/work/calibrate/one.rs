@@ -1,5 +1,5 @@
-//! In: a recording of boards, frames to leave out. Out: a calibration with its figures beside the station's present
-//! one; stored in the station when it is accepted.
+//! In: a recording of boards, frames to exclude. Out: a calibration with its figures beside those of the station's
+//! present one; stored in the station when it is accepted.
 //! Frame and unit: as the calibrations; px, mm, degrees.
 
 use super::super::jobs::Jobs;
@@ -25,7 +25,7 @@ use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The result that waits to be accepted, in the job's folder.
+/// The result that waits for acceptance, in the job's folder.
 const RESULT: &str = "calibration.json";
 const PAGE: &str = "calibration.html";
 
@@ -76,7 +76,7 @@ pub(in crate::web::work) fn calibrate(this: &Run, target: Target, name: &str, le
     }
 }
 
-/// An outcome that also says what was assumed.
+/// An outcome that also states what was assumed.
 fn saying(mut outcome: Outcome, assumed: Option<String>) -> Outcome {
     if let Outcome::Calibrate(figures) = &mut outcome {
         figures.reasons.extend(assumed);
@@ -84,7 +84,7 @@ fn saying(mut outcome: Outcome, assumed: Option<String>) -> Outcome {
     outcome
 }
 
-/// The recording less some of its frames; those that stay keep their poses.
+/// The recording without some of its frames; the others keep their poses.
 fn without(mut recording: Recording, leave_out: &[usize]) -> Result<Recording> {
     let all = recording.meta.frames.len();
     if let Some(strange) = leave_out.iter().find(|i| **i >= all) {
@@ -121,7 +121,7 @@ fn keep<T: Serialize>(this: &Run, c: &Calibration<T>, page: &Page, left_out: Vec
     })))
 }
 
-/// Figures of the station's present calibration; none where there is none that can be read.
+/// Figures of the station's present calibration; empty if there is none that can be read.
 fn former(station: &Path, kind: Kind) -> BTreeMap<String, f64> {
     #[derive(serde::Deserialize)]
     struct Told {
@@ -133,8 +133,8 @@ fn former(station: &Path, kind: Kind) -> BTreeMap<String, f64> {
     told.map(|t| t.quality.figures).unwrap_or_default()
 }
 
-/// Stores a finished calibration in the station. Errors: another job, a verdict that is not good enough, accepted
-/// before.
+/// Stores a finished calibration in the station. Returns an error for another kind of job, a verdict that is not
+/// good enough, or a calibration that was accepted before.
 pub fn accept(jobs: &Jobs, job: &Job) -> Result<Job> {
     let refuse = |what: String| Err(Fault::usage(what).next("calibrate again"));
     let target = match (&job.order, job.state) {

@@ -1,5 +1,5 @@
-//! In: recordings of boards. Out: the whole rig from one solve beside the station's present one; stored together when
-//! it is accepted.
+//! In: recordings of boards. Out: calibrations of the whole rig from one solve, beside the station's present ones;
+//! stored together when they are accepted.
 //! Frame and unit: mm, degrees.
 
 use super::super::run::Run;
@@ -13,7 +13,7 @@ use crate::web::guard::resolve;
 use crate::web::message::{CalibrationFigures, JointOrder, Outcome};
 use std::path::Path;
 
-/// The result that waits to be accepted, in the job's folder: laid out as a station's.
+/// The result that waits for acceptance, in the job's folder; it has the layout of a station's folder.
 const RESULT: &str = "result";
 
 pub(in crate::web::work) fn joint(this: &Run, order: &JointOrder) -> Result<Outcome> {
@@ -30,12 +30,12 @@ pub(in crate::web::work) fn joint(this: &Run, order: &JointOrder) -> Result<Outc
     Ok(Outcome::Joint(Box::new(keep(this, &result, &mounted)?)))
 }
 
-/// As the station's settings have it.
+/// The solve with the station's settings.
 pub(super) fn run(settings: &Settings, mounted: &Mounted) -> JointRun {
     JointRun::new(mounted.mount, asked(settings, None), &settings.extraction, Where::default())
 }
 
-/// Keeps a result in the job's folder; its figures, and what was assumed.
+/// Stores a result in the job's folder; returns its figures, and what was assumed.
 pub(super) fn keep(this: &Run, result: &JointResult, mounted: &Mounted) -> Result<CalibrationFigures> {
     let folder = this.folder.join(RESULT);
     crate::files::make_folder(&folder)?;
@@ -55,7 +55,7 @@ pub(super) fn keep(this: &Run, result: &JointResult, mounted: &Mounted) -> Resul
     })
 }
 
-/// Stores a kept result in the station, all of it or nothing.
+/// Stores a result in the station, all of it or nothing.
 pub(super) fn store(folder: &Path, station: &Path) -> Result<()> {
     accept_joint(&folder.join(RESULT), station).map(|_| ())
 }
@@ -68,10 +68,10 @@ mod tests {
     use std::path::PathBuf;
     use std::process::Command;
 
-    /// Where the process that is stopped finds the job and the station.
+    /// Variable that names the folder of job and station to the process that is stopped.
     const FOLDER: &str = "SHEETLIGHT_TEST_ACCEPTS_IN";
 
-    /// A set of records whose covariance and page tell of which seed it is.
+    /// A set of records whose covariance and page identify its seed.
     fn made(folder: &Path, seed: u64) {
         let rig = Station::random(seed).calibrations(None);
         let beside = |stored: &Rig| {
@@ -86,13 +86,14 @@ mod tests {
         rig.store_all_with(folder, beside).unwrap();
     }
 
-    /// Which seed's set a station holds; fails where it holds parts of two. `sets`: the folders of seeds 1 and 2.
+    /// The seed of the set that a station contains; fails if it contains parts of two sets. `sets`: the folders of
+    /// seeds 1 and 2.
     fn held(station: &Path, sets: [&Path; 2]) -> u64 {
         let rig = Rig::load(station).unwrap();
         rig.belong_together().unwrap();
         let joint = rig.joint().expect("a covariance").expect("a covariance of these records");
         let seed = joint.matrix[0][0] as u64;
-        // Read from its files, as the station is.
+        // Read from files, as the station is.
         let made = Rig::load(sets[seed as usize - 1]).unwrap();
         let values = |rig: &Rig| {
             let camera = rig.camera.as_ref().unwrap().value;

@@ -1,5 +1,5 @@
-//! In: a calibration that drives itself, while it runs or afterwards; a recording of boards. Out: its pictures with
-//! the corners that were found and how the board leans.
+//! In: an automatic calibration, running or finished; a recording of boards. Out: its pictures with the detected
+//! corners and the tilt of the board.
 //! Frame and unit: px of the picture, degrees.
 
 use super::super::jobs::Jobs;
@@ -17,21 +17,21 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard};
 
-/// Pictures that are shown.
+/// Most pictures that are shown.
 const NEWEST: usize = 6;
-/// Pictures whose corners are remembered.
+/// Most pictures whose corners are cached.
 const REMEMBERED: usize = 400;
 
-/// Corners of pictures that were looked at before.
+/// Cache of the corners in pictures.
 #[derive(Default)]
 pub struct Views(Mutex<BTreeMap<PathBuf, BoardView>>);
 
 impl Views {
-    /// The newest pictures of a job, the newest one last. None while there are none.
+    /// The newest pictures of a job, the newest one last; empty while there are none.
     pub fn of(&self, jobs: &Jobs, id: &str) -> Result<Vec<BoardView>> {
         let job = jobs.get(id)?;
         let folder = jobs.folder(&job);
-        // A job that was resumed began in another folder beside the former one.
+        // A resumed job started another folder beside the previous one.
         let names = (0..).map(|k| if k == 0 { "pictures".into() } else { format!("pictures-{k}") });
         let Some(pictures) = names.take_while(|n: &String| folder.join(n).is_dir()).last() else {
             return Ok(Vec::new());
@@ -50,7 +50,7 @@ impl Views {
     /// The board in a picture of a recording.
     ///
     /// # Errors
-    /// No such recording or frame; one without a board.
+    /// No such recording or frame; a recording without a board.
     pub fn of_recording(&self, place: &Place, name: &str, frame: usize) -> Result<BoardView> {
         let recording = Recording::open(&resolve(&place.recordings, name)?)?;
         let at = recording.meta.frames.get(frame).ok_or_else(|| {
@@ -111,14 +111,14 @@ impl Views {
     }
 }
 
-/// A camera of which nothing is known: as long as its picture is wide. Good for a gauge, and for nothing else.
+/// Intrinsics for an unknown camera, with a focal length equal to the picture's width. Sufficient for a gauge only.
 fn usual(width: u32, height: u32) -> Intrinsics {
     let f = f64::from(width);
     let (cx, cy) = (0.5 * (f - 1.0), 0.5 * (f64::from(height) - 1.0));
     Intrinsics { fx: f, fy: f, cx, cy, skew: 0.0, distortion: [0.0; 5].into(), width, height }
 }
 
-/// How far the board's normal, taken towards the camera, leans to the right and downwards in the picture.
+/// Tilt of the board's normal, taken towards the camera, to the right and downwards in the picture, degrees.
 fn lean_deg(camera_from_board: &Rigid<Camera, Board>) -> [f64; 2] {
     let n = camera_from_board.rotation.column(2);
     let side = -n.z.signum();
@@ -134,7 +134,7 @@ mod tests {
     fn a_board_leans_where_it_is_tilted_to_whichever_way_its_z_points() {
         let at = Vec3::new(0.0, 0.0, 300.0);
         for flipped in [0.0, std::f64::consts::PI] {
-            // Turned about the camera's y: the side that faces the camera looks to the left, then to the right.
+            // Rotated about the camera's y: the side that faces the camera turns to the left, then to the right.
             for (about_y, wanted) in [(20f64, -20.0), (-35.0, 35.0)] {
                 let tilt: Rigid<Camera, Camera> = Rigid::from_vectors(&Vec3::new(0.0, about_y.to_radians(), 0.0), at);
                 let board: Rigid<Camera, Board> = Rigid::from_vectors(&Vec3::new(flipped, 0.0, 0.0), Vec3::zeros());

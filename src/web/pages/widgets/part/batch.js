@@ -1,5 +1,5 @@
-// In: recordings, a recipe, settings. Out: each of them scanned and searched, one job after the
-// other; how far the places that were found lie apart, beside what each said of itself.
+// In: recordings, a recipe, settings. Out: each recording scanned and searched, one job after the
+// other; the scatter of the found poses beside their stated uncertainty.
 
 import { get, post } from "../../base/api.js";
 import { fill, h, num, svg } from "../../base/dom.js";
@@ -40,7 +40,8 @@ export async function batch(place, settings, problem) {
           .filter((j) => j.outcome.recipe === recipe && !j.order.pins)
           .map((j) => j.id),
         names = found.join(" ");
-      // Jobs are told of while they run: only other places are other repeats.
+      // Running jobs send events all the time: the repeatability changes only with the list of
+      // found poses.
       if (names === before) return;
       const repeats = await post("/repeats", { jobs: found });
       if (mine !== turn) return;

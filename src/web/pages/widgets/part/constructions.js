@@ -1,5 +1,5 @@
-// Shows a recipe's constructed points beside the picture. The program writes them into the text, so
-// that its comments stay.
+// Shows a recipe's constructed points beside the picture. The program writes them into the text,
+// so that the text's comments are preserved.
 
 import { post } from "../../base/api.js";
 import { fill, h, num } from "../../base/dom.js";

@@ -1,4 +1,5 @@
-// In: a drawing of a part (DXF), chosen or dropped here. Out: a recipe of it, made by the program.
+// In: a drawing of a part (DXF), chosen or dropped here. Out: a recipe that the program makes
+// from it.
 
 import { post } from "../../base/api.js";
 import { fill, h, num } from "../../base/dom.js";

@@ -1,5 +1,5 @@
-// In: a scan and its map. Out: what takes glints and what does not matter out of what is looked at;
-// undone one by one; kept as a scan.
+// In: a scan and its map. Out: filters that remove glints and irrelevant surfaces from the view;
+// they can be undone one by one, and the result can be stored as a scan.
 
 import { get, put } from "../../base/api.js";
 import { fill, h, num, thousands } from "../../base/dom.js";

@@ -1,5 +1,5 @@
-// In: a grid's first hole, its columns, rows and pitch, the part's turn. Out: middle and radius of
-// every hole, mm in the map.
+// In: a grid's first hole, its columns, rows and pitch, the part's rotation. Out: centre and
+// radius of every hole, mm in the map.
 
 /** Columns go along the part's x, rows along its y; degrees from x towards y. */
 export function places({ first, radius, columns, rows, pitch }, degrees) {

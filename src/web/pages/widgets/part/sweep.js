@@ -1,6 +1,6 @@
-// In: a recipe, what the operator states. Out: how the line will go over the part before it is
-// scanned, drawn as the camera sees the board and into the live picture; which speed goes with
-// which step, and what limits it. The program plans it: the job moves by the same.
+// In: a recipe, the operator's values. Out: the path of the laser line over the part before it is
+// scanned, drawn as the camera sees the board and into the live picture; matching speed and step,
+// and what limits them. The program plans the sweep, with the same code as the job.
 
 import { get } from "../../base/api.js";
 import { fill, h, num, svg } from "../../base/dom.js";

@@ -1,5 +1,5 @@
-// In: an armed robot with a board below it. Out: a calibration that drives itself: next pose, what
-// it has seen, how the expected error falls.
+// In: an armed robot with a board below it. Out: an automatic calibration: the next pose, the
+// pictures so far, the decrease of the expected error.
 
 import { get, picture, url } from "../../base/api.js";
 import { fill, h, num, svg } from "../../base/dom.js";

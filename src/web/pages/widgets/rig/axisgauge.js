@@ -1,5 +1,5 @@
-// In: pictures of a board that rides on an axis, with the axis' counts. Out: where it stopped, and
-// where it should stop next.
+// In: pictures of a board that an axis carries, with the axis' counts. Out: where the axis
+// stopped, and where it should stop next.
 
 import { fill, h, num, svg, thousands } from "../../base/dom.js";
 import { t } from "../../base/text.js";

@@ -1,5 +1,5 @@
-// In: pictures of a calibration board with their corners. Out: which places of the picture the
-// boards covered, how they leaned, and where to hold the board next, also drawn into a picture.
+// In: pictures of a calibration board with their corners. Out: which areas of the picture the
+// boards covered, their tilts, and where to hold the board next, also drawn into a picture.
 
 import { fill, h, svg } from "../../base/dom.js";
 import { t } from "../../base/text.js";
@@ -54,7 +54,7 @@ export function next(views) {
         best = { empty, few, box: [c / COLUMNS, r / ROWS, WIDE / COLUMNS, HIGH / ROWS] };
     }
   const leans = views.map((v) => v.lean_deg).filter(Boolean);
-  // The way whose nearest picture is the farthest.
+  // The tilt direction whose nearest picture is farthest away.
   const far = ([, x, y]) =>
     Math.min(90, ...leans.map(([a, b]) => Math.hypot(a - x * LEAN, b - y * LEAN)));
   const way = WAYS.reduce((a, b) => (far(b) > far(a) + 1e-6 ? b : a));

@@ -1,4 +1,4 @@
-// In: what the camera can be set to. Out: its exposure and gain by handle, all else by name; the
+// In: the camera's settings. Out: sliders for exposure and gain, all other settings by name; the
 // exposure that suits the stripe, found by the program.
 
 import { get, put } from "../../base/api.js";

@@ -1,5 +1,5 @@
-// In: a picture on a map. Out: the part of it in which the stripe is looked for, drawn by its
-// corners and edges, kept in the station's settings.
+// In: a picture on a map. Out: the region in which the stripe is searched, adjusted by its
+// corners and edges, stored in the station's settings.
 
 import { get, put } from "../../base/api.js";
 import { fill, h } from "../../base/dom.js";

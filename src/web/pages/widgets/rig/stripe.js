@@ -1,5 +1,5 @@
-// In: what a picture shows. Out: its stripe along its length: peak, width, contrast, and where it
-// is dark.
+// In: measures of a picture. Out: its stripe along its length: peak, width, contrast, and where
+// it is dark.
 
 import { fill, h, num, svg } from "../../base/dom.js";
 import { t } from "../../base/text.js";

@@ -1,7 +1,7 @@
-// In: a scan. Out: its points in three dimensions: turn by dragging, move with the right button or
-// two fingers, enlarge with the wheel; a click gives the point's coordinates and sigma. Points come
-// spread over the scan, so that the first share of them shows all of it coarsely: while it turns,
-// as many are drawn as the machine draws fluently, and that number is said.
+// In: a scan. Out: its points in three dimensions: rotate by dragging, move with the right button
+// or two fingers, zoom with the wheel; a click shows the point's coordinates and sigma. The
+// points are ordered so that the first part of them covers the whole scan coarsely. During a
+// rotation as many are drawn as the machine can draw fluently, and that number is shown.
 
 import { bytes, get } from "../../base/api.js";
 import { fill, h, num, thousands } from "../../base/dom.js";
@@ -128,7 +128,7 @@ export async function cloud(place, id, lines = []) {
       cy = Math.cos(c.yaw),
       sp = Math.sin(c.pitch),
       cp = Math.cos(c.pitch);
-    // The eye looks at `at` from above: rows are right, up and back.
+    // The eye looks at `at` from above: the rows are right, up and back.
     const r = [cy, -sy, 0, sy * sp, cy * sp, cp, sy * cp * -1, -cy * cp, sp];
     const back = [sy * cp * -1, -cy * cp, sp];
     const eye = [0, 1, 2].map((k) => c.at[k] + back[k] * c.far);
@@ -178,7 +178,8 @@ export async function cloud(place, id, lines = []) {
   const redraw = (moving) => {
     c.moving = moving;
     clearTimeout(still);
-    // All points are drawn when it stands: while a finger is down it may turn on at any moment.
+    // All points are drawn when the view rests. While a finger is down the rotation may continue
+    // at any moment.
     if (moving && !from) still = setTimeout(() => redraw(false), 180);
     if (!asked) {
       asked = true;

@@ -1,5 +1,5 @@
-// In: a number from 0 to 1. Out: a colour: ordered (dark to light, told apart without red and
-// green), diverging, grey.
+// In: a number from 0 to 1. Out: a colour of a scale: ordered (dark to light, distinguishable
+// without red and green), diverging, grey.
 
 const ORDERED = [
   [68, 1, 84],

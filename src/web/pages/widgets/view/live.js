@@ -1,6 +1,6 @@
-// In: the camera, maybe a job that found a part. Out: the camera's newest picture, small, again and
-// again, with the part's outlines where the robot's pose at that picture says; one that is slow
-// gets fewer.
+// In: the camera, and optionally a job that found a part. Out: the camera's newest picture, small
+// and updated repeatedly, with the part's outlines at the robot's pose of that picture. A slow
+// machine gets fewer pictures.
 
 import { bytes, get } from "../../base/api.js";
 import { fill, h } from "../../base/dom.js";
@@ -74,7 +74,7 @@ export function livePicture(place, of = () => null, mark = (_g, _width, _height)
         b = await bytes(`/camera/newest?after=${number}`).catch(() => null);
       if (over) return;
       if (!b || b.byteLength < 20) {
-        // No newer picture: the part may have been found since this one.
+        // There is no newer picture, but the part may have been found since this one.
         if (number && of() !== shown) {
           shown = of();
           draw(await ghost(shown));
@@ -86,7 +86,7 @@ export function livePicture(place, of = () => null, mark = (_g, _width, _height)
         grey = new Uint8Array(b, 20 + 12 * many);
       number = n;
       shown = job;
-      // Picture and outlines appear together: of the same moment.
+      // Picture and outlines appear together, because they belong to the same moment.
       const part = await ghost(job);
       if (over) return;
       const begun = performance.now();
@@ -97,7 +97,7 @@ export function livePicture(place, of = () => null, mark = (_g, _width, _height)
       const out = new Uint32Array(image.data.buffer);
       for (let i = 0; i < out.length; i++) out[i] = 0xff000000 | (grey[i] * 0x010101);
       draw(part);
-      // A glance: what else the page does, a held button above all, comes first.
+      // This view has low priority: the rest of the page, above all a held button, comes first.
       await new Promise(requestAnimationFrame);
       await new Promise((go) =>
         setTimeout(go, Math.max(150, Math.min(2000, 3 * (performance.now() - begun)))),

@@ -1,6 +1,6 @@
-// In: numbers on a grid. Out: a picture of them to move, enlarge and point at, by mouse, touch and
-// keyboard: arrows move the cross (Shift: faster), Enter puts a point, + - 0 enlarge. Coordinates
-// are the grid's, mm, y up.
+// In: numbers on a grid. Out: a picture of them to move, zoom and select points in, by mouse,
+// touch and keyboard: arrows move the cross (Shift: faster), Enter sets a point, + - 0 zoom.
+// Coordinates are the grid's, mm, y up.
 
 import { fill, h, num } from "../../base/dom.js";
 import { t } from "../../base/text.js";
@@ -26,8 +26,8 @@ export function map(place, label) {
     length = h("div", { class: "length" });
   fill(place, canvas, read, scale, length);
   place.classList.add("map");
-  // Drawn by the processor: pixels come from it, and a machine without a GPU is three times as fast
-  // that way.
+  // Drawn by the processor: it computes the pixels, and without a GPU this is three times as
+  // fast.
   const g = canvas.getContext("2d", { willReadFrequently: true }),
     off = document.createElement("canvas");
   const m = {

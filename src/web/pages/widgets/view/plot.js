@@ -1,5 +1,5 @@
-// In: numbers along a line. Out: a curve with its band of standard deviations; pieces of it are
-// chosen by dragging, or by arrows and Enter.
+// In: numbers along a line. Out: a curve with a band of its standard deviations; pieces of it are
+// selected by dragging, or by arrows and Enter.
 
 import { fill, h, num, svg } from "../../base/dom.js";
 import { t } from "../../base/text.js";

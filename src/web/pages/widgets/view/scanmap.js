@@ -1,4 +1,4 @@
-// In: a scan. Out: its height map with layers to choose, in the map widget.
+// In: a scan. Out: its height map with selectable layers, in the map widget.
 
 import { bytes, get } from "../../base/api.js";
 import { all, fill, h, num } from "../../base/dom.js";
@@ -48,8 +48,8 @@ export async function scanMap(place, id, label = t("Height map")) {
         intensity: head.intensity,
         sigma: head.sigma_mm,
       }[name];
-    // Height as colour, the light that came back as brightness: a print or an edge in the colour of
-    // its height.
+    // Height as colour, the reflected light as brightness: a print or an edge appears in the
+    // colour of its height.
     const grey = layers.intensity,
       full = head.intensity[1] || 1,
       lit = both
@@ -75,7 +75,7 @@ export async function scanMap(place, id, label = t("Height map")) {
     h("button", { onclick: () => view.fit() }, t("All")),
   );
   await showLayer("height");
-  // What the cursor reads beside heights comes after the first look.
+  // The other values that the cursor shows are loaded after the first view.
   read("sigma")
     .then(() => read("intensity"))
     .catch(() => {});
