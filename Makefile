@@ -9,7 +9,7 @@ VENV := .venv
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 export XDG_RUNTIME_DIR ?= $(shell mktemp -d /tmp/sheetlight-run.XXXXXX)
 
-.PHONY: station browser demo pages book lint test bench bench-peers vulkan python notebooks cameras build clean
+.PHONY: station browser demo pages book lint test bench bench-peers vulkan python notebooks pictures cameras build clean
 
 demo: vulkan build
 	$(TARGET)/release/sheetlight demo --out demo
@@ -74,6 +74,11 @@ python:
 # The figures of docs/python.md: the last one of each notebook, with the installed Python package.
 notebooks:
 	$(VENV)/bin/python python/notebooks/run.py --pictures docs/images
+
+# All pictures of the documents, from the program as it is: the screen's, the notebooks', the guides'.
+pictures: vulkan python browser build notebooks
+	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" SHEETLIGHT_WRITE=1 $(CARGO) test --locked --test web
+	python3 tools/pictures.py $(TARGET)/release/sheetlight
 
 clean:
 	$(CARGO) clean

@@ -101,6 +101,9 @@ impl Markdown {
                 all.headings.push(heading.to_owned());
                 open = Some((n, heading.to_owned()));
                 all.end(&mut open);
+            } else if let Some((_, target)) = line.split_once("]: ").filter(|(name, _)| name.starts_with('[')) {
+                all.end(&mut open);
+                all.links.push((n, target.to_owned()));
             } else if line.starts_with('|') {
                 all.end(&mut open);
                 for cell in line.replace("\\|", "/").split('|').filter(|c| c.chars().any(char::is_alphanumeric)) {
@@ -166,12 +169,12 @@ pub fn words(sentence: &str) -> usize {
 #[test]
 fn prose_is_told_from_code_and_sentences_from_each_other() {
     let text = "# A *head*\n\nOne `x. Y` two. Three [four](five.md#six),\nseven.\n\n- eight. Nine\n  ten\n\n\
-                ```console\n$ run\nout\n```\n\n    $ old\n\n| a. B | c |\n|---|---|\n";
+                ```console\n$ run\nout\n```\n\n    $ old\n\n| a. B | c |\n|---|---|\n\n[k]: l.md\n";
     let read = Markdown::read(text);
     let prose: Vec<&str> = read.prose.iter().map(|p| p.text.as_str()).collect();
     assert_eq!(prose, ["A head", "One CODE two. Three four, seven.", "eight. Nine ten", "a. B", "c"]);
     assert_eq!(sentences(prose[1]), ["One CODE two.", "Three four, seven."]);
-    assert_eq!(read.links, [(3, "five.md#six".to_owned())]);
+    assert_eq!(read.links, [(3, "five.md#six".to_owned()), (19, "l.md".to_owned())]);
     assert_eq!((read.fences[0].info.as_str(), read.fences[0].lines.len()), ("console", 2));
     assert_eq!(read.indented, [(14, "$ old".to_owned())]);
     assert_eq!(anchor("What `--pair` says, and why"), "what---pair-says-and-why");
