@@ -13,8 +13,8 @@ pub struct MeasureOptions {
     pub edge_gate_mm: f64,
     /// Points nearer than this to an edge are excluded from the fit of height and tilt, mm, 0.0001 to 100.
     pub margin_mm: f64,
-    /// Standard deviation of the error that a piece of an edge shares and that the model of partly lit samples does not
-    /// explain (a wall that shows, a chamfer, the pixels' raster), as a share of the sampling step, 0 to 0.5.
+    /// Standard deviation of the error that a piece of an edge shares, as a share of the sampling step, 0 to 0.5. It
+    /// covers what the model of partly lit samples does not explain: a wall that shows, a chamfer, the pixels' raster.
     pub edge_bias: f64,
     /// Standard deviation of a part's sizes relative to the drawing, common to all of them, as a share, 0 to 0.1. One
     /// direction differs from the other by a third of it.

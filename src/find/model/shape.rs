@@ -81,7 +81,7 @@ pub struct Shape {
     /// Height of the surface that the shape forms (high) or cuts into (low), mm. Default 0, the datum.
     #[serde(default)]
     pub z_mm: f64,
-    /// Repeats the shape about its own place. Default once.
+    /// Repeats the shape about its own position. Default once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grid: Option<Grid>,
     /// Used by the search for the part. Default true.
