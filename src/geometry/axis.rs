@@ -152,9 +152,9 @@ impl Axis {
         by.dot(&self.direction()) / self.pitch
     }
 
-    /// Error of the pose of a part measured at a count, in axis coordinates, for a unit error in each of dx dy dz
-    /// (direction, camera frame), pitch, and for a turntable px py pz (origin, camera frame, mm). The frame at count 0
-    /// is unchanged.
+    /// Error of the pose of a part measured at a count, in axis coordinates, for a unit error in each parameter. These
+    /// are dx dy dz (direction, camera frame), pitch, and for a turntable px py pz (origin, camera frame, mm). The
+    /// frame at count 0 is unchanged.
     pub fn errors(&self, count: f64) -> Vec<Twist> {
         let (d, p, by) = (self.direction(), self.origin(), self.pitch * count);
         let unit = |k: usize| Vec3::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
@@ -164,7 +164,7 @@ impl Axis {
             AxisKind::Linear => {
                 (0..3).map(|k| Twist { v: unit(k) * -by, w: none }).chain([Twist { v: d * -count, w: none }]).collect()
             }
-            // exp(-by d), by the left Jacobian of the rotation group, for a step perpendicular to d.
+            // The derivative of exp(-by d), by the left Jacobian of the rotation group, for a step perpendicular to d.
             AxisKind::Turntable => (0..3)
                 .map(|k| about(unit(k) * -by.sin() + d.cross(&unit(k)) * (1.0 - by.cos())))
                 .chain([about(d * -count)])
