@@ -1,5 +1,5 @@
-//! In: scenes (pictures, height maps, points) and recipes. Out: matches, and insertion poses with their
-//! uncertainty or an honest refusal.
+//! In: scenes (pictures, height maps, points) and recipes. Out: matches, and insertion poses with their uncertainty or
+//! a refusal with its reason.
 //! Frame and unit: scene pixels for matches; base frame, mm, for poses.
 
 pub mod dxf;

@@ -5,7 +5,7 @@
 use crate::fault::{Fault, Result};
 use crate::raster::{Image, Mask};
 
-/// What a layer's numbers are; a model edge is looked for in the layer of its own kind only.
+/// What a layer's numbers are; a model edge is searched only in layers of its own kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -15,7 +15,7 @@ pub enum Kind {
     Height,
 }
 
-/// One map of numbers, row-major; NaN is missing and never makes an edge.
+/// One map of numbers, row-major; NaN marks a missing cell, which never makes an edge.
 #[derive(Clone, Debug)]
 pub struct Layer {
     /// What the values are.
@@ -38,7 +38,7 @@ pub struct Scene {
 }
 
 impl Layer {
-    /// Refuses sizes that do not fit and infinite values.
+    /// Refuses a size that does not match the number of values, and infinite values.
     pub fn new(kind: Kind, width: usize, height: usize, values: Vec<f32>) -> Result<Layer> {
         if values.len() != width * height || width == 0 || height == 0 {
             return Err(Fault::input(format!("a map of {width}x{height} cells holds {} values", values.len()))
@@ -63,7 +63,8 @@ impl Layer {
         }
     }
 
-    /// Gives missing cells the values of their neighbours, ring by ring; a layer without any value stays as it is.
+    /// Fills missing cells with the values of their neighbours, ring by ring; a layer without any value stays
+    /// unchanged.
     fn carry_on(&mut self) {
         let (w, h) = (self.width, self.height);
         let mut ring: Vec<usize> = (0..w * h).filter(|i| !self.values[*i].is_nan()).collect();
@@ -137,9 +138,9 @@ pub struct Region {
     pub x0: usize,
     /// First row.
     pub y0: usize,
-    /// Column behind the last one.
+    /// Column after the last one.
     pub x1: usize,
-    /// Row behind the last one.
+    /// Row after the last one.
     pub y1: usize,
 }
 
@@ -159,7 +160,7 @@ impl Region {
 }
 
 impl Scene {
-    /// `mm_per_px` is the edge of a cell, mm. Refuses no layers, and layers that differ in size.
+    /// `mm_per_px` is the edge of a cell, mm. Refuses an empty list, and layers that differ in size.
     pub fn new(layers: Vec<Layer>, mm_per_px: Option<f64>) -> Result<Scene> {
         let Some(first) = layers.first() else {
             return Err(Fault::input("a scene without layers")
@@ -177,7 +178,7 @@ impl Scene {
     pub fn from_image(image: &Image) -> Scene {
         Scene { layers: vec![Layer::from_image(image)], mm_per_px: None }
     }
-    /// The same, with the cells missing where `hidden` is lit.
+    /// Like `from_image`, but the cells where `hidden` is set are missing.
     pub fn from_image_in_part(image: &Image, hidden: Option<&Mask>) -> Scene {
         let mut scene = Scene::from_image(image);
         if let Some(hidden) = hidden {
@@ -190,8 +191,7 @@ impl Scene {
         }
         scene
     }
-    /// The same, with every missing cell holding the value of a nearest one that is there, in steps along columns and
-    /// rows.
+    /// Fills each missing cell with the value of a nearest valid cell, counted in steps along columns and rows.
     pub fn carried_on(mut self) -> Scene {
         self.layers.iter_mut().for_each(Layer::carry_on);
         self
@@ -213,13 +213,13 @@ impl Scene {
         }
         out
     }
-    /// The same cells of every layer; the region lies within the scene.
+    /// Cuts the same cells out of every layer; the region must lie within the scene.
     pub fn crop(&self, region: Region) -> Scene {
         Scene { layers: self.layers.iter().map(|l| l.crop(region)).collect(), mm_per_px: self.mm_per_px }
     }
 }
 
-/// A coordinate of level 0 seen on level `level`: (x + 1/2) / 2^level - 1/2.
+/// A coordinate of level 0 expressed on level `level`: (x + 1/2) / 2^level - 1/2.
 pub fn to_level(x: f64, level: usize) -> f64 {
     (x + 0.5) / (1u64 << level) as f64 - 0.5
 }

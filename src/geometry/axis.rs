@@ -1,5 +1,5 @@
-//! In: direction and pitch of a linear axis or turntable before a camera. Out: how a part that rides on it stands at
-//! a count, and how an error of each parameter moves it.
+//! In: direction and pitch of a linear axis or turntable before a camera. Out: the pose of a part that rides on it at a
+//! count, and how an error of each parameter moves the part.
 //! Frame and unit: camera, axis (the part's side at count 0), mm, rad; docs/math.md, Axis.
 
 use super::{Board, Camera, Mat3, Ride, Rigid, Twist, Vec3, exp, log};
@@ -10,12 +10,12 @@ use super::{Board, Camera, Mat3, Ride, Rigid, Twist, Vec3, exp, log};
 pub enum AxisKind {
     /// It moves along a straight line.
     Linear,
-    /// It turns about a line that stands still.
+    /// It turns about a fixed line.
     Turntable,
 }
 
 impl AxisKind {
-    /// For people.
+    /// Name for people.
     pub fn words(self) -> &'static str {
         match self {
             AxisKind::Linear => "linear axis",
@@ -24,25 +24,25 @@ impl AxisKind {
     }
 }
 
-/// What a recording's counts count.
+/// Unit of a recording's counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, strum::IntoStaticStr)]
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
 pub enum CountUnit {
     /// An encoder's steps.
     Count,
-    /// Millimetres that the axis says it moved.
+    /// Millimetres of motion, as the axis reports.
     Mm,
-    /// Degrees that the turntable says it turned.
+    /// Degrees of rotation, as the turntable reports.
     Deg,
 }
 
 impl CountUnit {
-    /// In files and messages.
+    /// Name in files and messages.
     pub fn name(self) -> &'static str {
         self.into()
     }
-    /// What one of it is by its own statement, mm or rad; an encoder's step states nothing.
+    /// Stated size of one unit, mm or rad; `None` for an encoder's step.
     pub fn stated(self) -> Option<f64> {
         match self {
             CountUnit::Count => None,
@@ -52,14 +52,14 @@ impl CountUnit {
     }
 }
 
-/// A linear axis or turntable as a fixed camera sees it. Where the axis carries the sensor it is the same: the part
-/// moves against the camera.
+/// A linear axis or turntable as seen by a fixed camera. The same description holds where the axis carries the sensor:
+/// the part moves relative to the camera.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Axis {
     /// Whether it moves or turns.
     pub kind: AxisKind,
-    /// What its counts count.
+    /// Unit of its counts.
     pub unit: CountUnit,
     /// Linear: mm a count along the frame's x. Turntable: rad a count about the frame's z, right-handed.
     pub pitch: f64,
@@ -68,14 +68,14 @@ pub struct Axis {
     pub camera_from_axis: Rigid<Camera, Ride>,
 }
 
-/// A motion as it is found: which way, and about where.
+/// A motion as measured: its direction and where it lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Riding {
     /// Whether it moves or turns.
     pub kind: AxisKind,
-    /// What its counts count.
+    /// Unit of its counts.
     pub unit: CountUnit,
-    /// Linear: of growing counts. Turntable: either way along the axis. Camera frame, of unit length.
+    /// Linear: direction of growing counts. Turntable: along the axis, either way. Camera frame, unit length.
     pub direction: Vec3,
     /// A point on a turntable's axis, camera frame, mm.
     pub point: Vec3,
@@ -83,18 +83,18 @@ pub struct Riding {
     pub pitch: f64,
 }
 
-/// Cosine from which a direction leads along another rather than across it.
+/// Least cosine at which a direction counts as along another rather than across it.
 const ALONG: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 impl Axis {
-    /// The axis frame by the board that rode at count 0 there (docs/conventions.md): its z leads out of the board's
-    /// face, on a turntable to the side that the camera stands on.
+    /// The axis frame, from the pose of the board at count 0 (docs/conventions.md). Its z points out of the board's
+    /// face, on a turntable to the camera's side.
     pub fn from_board(r: &Riding, camera_from_board: &Rigid<Camera, Board>) -> Axis {
         let at = camera_from_board.translation;
         let column = |k: usize| -> Vec3 { camera_from_board.rotation.column(k).into() };
         let across = |v: Vec3, along: &Vec3| v - along * along.dot(&v);
-        // The second only where the first leads along: a board may stand upright. Which of two lies more across would
-        // be chance, and the frame would be another one after the next calibration.
+        // The second direction is used only where the first points along the axis, as for an upright board. The choice
+        // of the one that lies more across would depend on noise, and the next calibration could give another frame.
         let cleaner = |a: Vec3, b: Vec3, along: &Vec3| if a.dot(along).abs() < ALONG { a } else { b };
         let forward = r.pitch >= 0.0;
         let (rotation, origin, pitch) = match r.kind {
@@ -114,18 +114,18 @@ impl Axis {
         Axis { kind: r.kind, unit: r.unit, pitch, camera_from_axis: Rigid::new(rotation, origin) }
     }
 
-    /// Of unit length, camera frame: the direction of motion, or the axis of rotation.
+    /// The direction of motion, or the axis of rotation; unit length, camera frame.
     pub fn direction(&self) -> Vec3 {
         let column = if self.kind == AxisKind::Linear { 0 } else { 2 };
         self.camera_from_axis.rotation.column(column).into()
     }
 
-    /// Where the frame's origin stands at count 0; for a turntable a point on the axis. Camera frame, mm.
+    /// The frame's origin at count 0; for a turntable a point on the axis. Camera frame, mm.
     pub fn origin(&self) -> Vec3 {
         self.camera_from_axis.translation
     }
 
-    /// How the part has moved at a count, camera frame.
+    /// Motion of the part at a count, camera frame.
     pub fn moved(&self, count: f64) -> Rigid<Camera, Camera> {
         let (along, by) = (self.direction(), self.pitch * count);
         match self.kind {
@@ -137,12 +137,12 @@ impl Axis {
         }
     }
 
-    /// Where the camera stands to the part at a count.
+    /// Pose of the camera relative to the part at a count.
     pub fn axis_from_camera(&self, count: f64) -> Rigid<Ride, Camera> {
         self.camera_from_axis.inverse() * self.moved(count).inverse()
     }
 
-    /// The count at which the camera stands so; a turntable's within half a turn of 0.
+    /// The count at which the camera has this pose; for a turntable within half a turn of 0.
     pub fn count_of(&self, axis_from_camera: &Rigid<Ride, Camera>) -> f64 {
         let moved = (self.camera_from_axis * *axis_from_camera).inverse();
         let by = match self.kind {
@@ -152,9 +152,9 @@ impl Axis {
         by.dot(&self.direction()) / self.pitch
     }
 
-    /// How a part measured at a count is off, in axis coordinates, for an error of one in each of dx dy dz
-    /// (direction, camera frame), pitch, and for a turntable px py pz (origin, camera frame, mm). The frame at count
-    /// 0 stays.
+    /// Error of the pose of a part measured at a count, in axis coordinates, for a unit error in each parameter. These
+    /// are dx dy dz (direction, camera frame), pitch, and for a turntable px py pz (origin, camera frame, mm). The
+    /// frame at count 0 is unchanged.
     pub fn errors(&self, count: f64) -> Vec<Twist> {
         let (d, p, by) = (self.direction(), self.origin(), self.pitch * count);
         let unit = |k: usize| Vec3::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
@@ -164,7 +164,7 @@ impl Axis {
             AxisKind::Linear => {
                 (0..3).map(|k| Twist { v: unit(k) * -by, w: none }).chain([Twist { v: d * -count, w: none }]).collect()
             }
-            // exp(-by d): by the left Jacobian of the rotation group, for a step at right angles to d.
+            // The derivative of exp(-by d), by the left Jacobian of the rotation group, for a step perpendicular to d.
             AxisKind::Turntable => (0..3)
                 .map(|k| about(unit(k) * -by.sin() + d.cross(&unit(k)) * (1.0 - by.cos())))
                 .chain([about(d * -count)])
@@ -190,7 +190,7 @@ mod tests {
         for kind in [AxisKind::Linear, AxisKind::Turntable] {
             let a = axis(kind);
             let p = Vec3::new(3.0, 4.0, 5.0);
-            // What the camera sees of the part at a count is the part in its own frame.
+            // What the camera sees at a count, mapped back, is the point in the part's own frame.
             let seen = a.moved(250.0).point(&a.camera_from_axis.point(&p));
             assert!((a.axis_from_camera(250.0).point(&seen) - p).norm() < 1e-9);
             let there = a.camera_from_axis.inverse().point(&seen);
@@ -203,8 +203,7 @@ mod tests {
         }
     }
 
-    /// A board that lies tilted by as much about its x as about its y, measured a little wrong each time: the same
-    /// frame.
+    /// A board tilted equally about its x and its y, measured with a small error each time: the frame is the same.
     #[test]
     fn the_frame_is_the_same_after_the_next_calibration() {
         for kind in [AxisKind::Linear, AxisKind::Turntable] {
@@ -228,7 +227,7 @@ mod tests {
             let here = a.axis_from_camera(count).point(&seen);
             let errors = a.errors(count);
             assert_eq!(errors.len(), if kind == AxisKind::Linear { 4 } else { 7 });
-            // The frame at count 0 stays: only the motion is another.
+            // The frame at count 0 is unchanged: only the motion differs.
             let measured = |d: Vec3, k: f64, p: Vec3| {
                 let by = k * count;
                 let back = match kind {
@@ -241,7 +240,7 @@ mod tests {
             let (d, k, p) = (a.direction(), a.pitch, a.origin());
             for (i, e) in errors.iter().enumerate() {
                 let (there, want) = match i {
-                    // Along d itself a direction cannot err.
+                    // A direction cannot have an error along itself.
                     0..=2 => {
                         let step = unit(i) - d * d.dot(&unit(i));
                         let along: Vec3 = (0..3).map(|j| errors[j].at(&here) * (step[j] / h)).sum();

@@ -1,14 +1,15 @@
-//! In: a square matrix and the names of its rows. Out: why it can be no covariance, if it cannot.
-//! Frame and unit: units of the names, multiplied; judged in correlations, so that millimetres and radians weigh alike.
+//! In: a square matrix and the names of its rows. Out: the reason why it is not a covariance, if it is not.
+//! Frame and unit: units of the names, multiplied; judged in correlations, so that millimetres and radians have equal
+//! weight.
 
 use nalgebra::DMatrix;
 
-/// What rounding may leave of symmetry and of eigenvalues below zero, in correlations.
+/// Tolerance for rounding, in symmetry and in eigenvalues below zero, in correlations.
 const ROUNDING: f64 = 1e-6;
 
-/// What a matrix with a row and a column a name lacks of a covariance, to be read after "the covariance": numbers
-/// that are not finite, a variance below 0, no symmetry, correlations beyond 1, an eigenvalue below 0. `None` where
-/// it is one.
+/// Why a matrix with a row and a column for each name is not a covariance, in words that follow "the covariance".
+/// Reasons: numbers that are not finite, a variance below 0, no symmetry, correlations beyond 1, an eigenvalue below 0.
+/// `None` for a covariance.
 pub fn not_a_covariance(names: &[impl AsRef<str>], c: &DMatrix<f64>) -> Option<String> {
     let n = names.len();
     assert_eq!((n, n), c.shape());

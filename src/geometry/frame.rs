@@ -3,7 +3,7 @@
 
 /// A coordinate frame. `NAME` appears in files and messages.
 pub trait Frame: Copy + Clone + std::fmt::Debug + PartialEq + Send + Sync + 'static {
-    /// As files and messages write it, e.g. "base".
+    /// Name in files and messages, e.g. "base".
     const NAME: &'static str;
 }
 
@@ -17,10 +17,10 @@ macro_rules! frames {
 }
 
 frames! {
-    /// Where clouds and insertion poses live: the robot's base; in recordings of an axis the [`Ride`]'s frame, in
-    /// those of a part that the robot carries its flange's. Reports name which.
+    /// Frame of clouds and insertion poses: the robot's base. In recordings of an axis it is the [`Ride`]'s frame; in
+    /// recordings of a part that the robot carries, its flange's. Reports name which.
     Base = "base";
-    /// The robot's mounting flange, which the robot reports its pose of.
+    /// The robot's mounting flange, whose pose the robot reports.
     Flange = "flange";
     /// The camera: x right, y down, z forward, origin in the centre of projection.
     Camera = "camera";
@@ -32,7 +32,7 @@ frames! {
     Tool = "tool";
     /// A height map: x along columns, y along rows, z up from the datum plane.
     Grid = "grid";
-    /// The part's side of a linear axis or turntable, where it stands at count 0: docs/conventions.md.
+    /// The part's side of a linear axis or turntable, at count 0: docs/conventions.md.
     Ride = "axis";
     /// A line-profile sensor: measures in its own x-z plane, y = 0.
     Sensor = "sensor";

@@ -8,7 +8,7 @@ use std::marker::PhantomData;
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(bound = "", deny_unknown_fields)]
 pub struct Plane<F: Frame> {
-    /// Of unit length, in frame `F`.
+    /// Unit normal, in frame `F`.
     pub normal: Vec3,
     /// Distance of the plane from the frame's origin along the normal, mm; negative on its other side.
     #[serde(rename = "offset_mm")]
@@ -21,17 +21,17 @@ pub struct Plane<F: Frame> {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(bound = "", deny_unknown_fields)]
 pub struct Ray<F: Frame> {
-    /// Where it begins, in frame `F`, mm.
+    /// Start of the ray, in frame `F`, mm.
     #[serde(rename = "origin_mm")]
     pub origin: Vec3,
-    /// Of unit length, in frame `F`.
+    /// Unit direction, in frame `F`.
     pub direction: Vec3,
     #[serde(skip)]
     frame: PhantomData<F>,
 }
 
 impl<F: Frame> Plane<F> {
-    /// Scales `normal` to unit length, `offset` with it. `None` where the normal has no length.
+    /// Scales `normal` to unit length, and `offset` with it. `None` if the normal has no length.
     pub fn new(normal: Vec3, offset: f64) -> Option<Self> {
         let n = normal.norm();
         (n > 1e-300 && n.is_finite()).then(|| Plane { normal: normal / n, offset: offset / n, frame: PhantomData })
@@ -40,14 +40,14 @@ impl<F: Frame> Plane<F> {
     pub fn distance(&self, p: &Vec3) -> f64 {
         self.normal.dot(p) - self.offset
     }
-    /// The same plane with its normal the other way round.
+    /// The same plane with the opposite normal.
     pub fn flipped(&self) -> Self {
         Plane { normal: -self.normal, offset: -self.offset, frame: PhantomData }
     }
 }
 
 impl<F: Frame> Ray<F> {
-    /// Scales `direction` to unit length; `None` where it has none.
+    /// Scales `direction` to unit length; `None` if it has no length.
     pub fn new(origin: Vec3, direction: Vec3) -> Option<Self> {
         let n = direction.norm();
         (n > 1e-300 && n.is_finite()).then(|| Ray { origin, direction: direction / n, frame: PhantomData })

@@ -30,8 +30,8 @@ impl<To: Frame, From: Frame> Rigid<To, From> {
     pub fn from_vectors(rotation: &Vec3, translation: Vec3) -> Self {
         Self::new(exp(rotation), translation)
     }
-    /// From a row-major 4x4 matrix. Returns the departure from orthonormality that was repaired;
-    /// above [`super::ORTHONORMAL_WARN`] the caller should say so.
+    /// From a row-major 4x4 matrix. Returns the orthonormality error that was repaired; above
+    /// [`super::ORTHONORMAL_WARN`] the caller should report it.
     pub fn from_rows(m: &[f64; 16]) -> Result<(Self, f64)> {
         if m.iter().any(|x| !x.is_finite()) {
             return Err(Fault::input("a pose holds a number that is not finite")
@@ -49,7 +49,7 @@ impl<To: Frame, From: Frame> Rigid<To, From> {
         let r = repair(&Mat3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]))?;
         Ok((Self::new(r.rotation, Vec3::new(m[3], m[7], m[11])), r.departure))
     }
-    /// Row-major 4x4.
+    /// As a row-major 4x4 matrix.
     pub fn to_rows(&self) -> [f64; 16] {
         let (r, t) = (&self.rotation, &self.translation);
         [
@@ -71,16 +71,16 @@ impl<To: Frame, From: Frame> Rigid<To, From> {
             1.0,
         ]
     }
-    /// The other way: maps `To` to `From`.
+    /// The inverse transform, which maps `To` to `From`.
     pub fn inverse(&self) -> Rigid<From, To> {
         let rt = self.rotation.transpose();
         Rigid::new(rt, -(rt * self.translation))
     }
-    /// A position.
+    /// Maps a position.
     pub fn point(&self, p: &Vec3) -> Vec3 {
         self.rotation * p + self.translation
     }
-    /// A direction: rotated, not shifted.
+    /// Maps a direction: rotated, not shifted.
     pub fn direction(&self, d: &Vec3) -> Vec3 {
         self.rotation * d
     }
@@ -108,7 +108,7 @@ impl<A: Frame, B: Frame, C: Frame> Mul<&Rigid<B, C>> for &Rigid<A, B> {
     }
 }
 
-/// On disk: `[16 numbers]`, row-major.
+/// Stored as `[16 numbers]`, row-major.
 impl<To: Frame, From: Frame> serde::Serialize for Rigid<To, From> {
     fn serialize<S: serde::Serializer>(&self, s: S) -> std::result::Result<S::Ok, S::Error> {
         self.to_rows().serialize(s)

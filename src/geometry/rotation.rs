@@ -1,15 +1,15 @@
-//! In: 3x3 matrices and rotation vectors. Out: proper rotations, their logarithms, and how far a
-//! given matrix was from being one (docs/math.md eq. 1 to 3).
+//! In: 3x3 matrices and rotation vectors. Out: proper rotations, their logarithms, and the orthonormality error of a
+//! given matrix (docs/math.md eq. 1 to 3).
 //! Frame and unit: none; radians.
 
 use super::{Mat3, Vec3};
 use crate::fault::{Fault, Result};
 
-/// Departure that a few products of rotations in double precision leave.
+/// Orthonormality error that a few products of rotations in double precision leave.
 const ROUNDED: f64 = 1e-13;
-/// Departure from orthonormality (Frobenius norm of RᵀR − I) above which a repair is reported.
+/// Orthonormality error (Frobenius norm of RᵀR − I) above which a repair is reported.
 pub const ORTHONORMAL_WARN: f64 = 1e-3;
-/// Departure above which a matrix is no rotation and is refused.
+/// Orthonormality error above which a matrix is refused as a rotation.
 pub const ORTHONORMAL_REFUSE: f64 = 1e-2;
 
 /// The cross-product matrix: `skew(a) * b == a × b`.
@@ -52,7 +52,7 @@ pub fn orthonormalise(m: &Mat3) -> Mat3 {
     u * Mat3::from_diagonal(&Vec3::new(1.0, 1.0, d.signum())) * vt
 }
 
-/// A rotation that was made orthonormal, with its departure before the repair.
+/// A rotation that was made orthonormal, with its orthonormality error before the repair.
 #[derive(Clone, Copy, Debug)]
 pub struct Repaired {
     /// The rotation nearest to the matrix.
@@ -62,13 +62,13 @@ pub struct Repaired {
 }
 
 impl Repaired {
-    /// True where a person should be told that the numbers were not a rotation.
+    /// True where the user should be warned that the numbers were not a rotation.
     pub fn worth_a_warning(&self) -> bool {
         self.departure > ORTHONORMAL_WARN
     }
 }
 
-/// Repairs a nearly orthonormal matrix; refuses mirrors, non-finite numbers and departures above
+/// Repairs a nearly orthonormal matrix; refuses mirrors, non-finite numbers and orthonormality errors above
 /// [`ORTHONORMAL_REFUSE`].
 pub fn repair(m: &Mat3) -> Result<Repaired> {
     if m.iter().any(|x| !x.is_finite()) {
@@ -86,7 +86,8 @@ pub fn repair(m: &Mat3) -> Result<Repaired> {
         .cause("columns and rows swapped, a left-handed frame, or too few digits printed")
         .next("give the pose with more digits, or name the convention it was written in"));
     }
-    // What rounding alone leaves stays as it is, bit for bit: a record that is read and stored again must not change.
+    // A matrix with rounding errors alone is returned bit for bit: a record that is read and stored again must not
+    // change.
     let rotation = if departure < ROUNDED { *m } else { orthonormalise(m) };
     Ok(Repaired { rotation, departure })
 }

@@ -1,84 +1,84 @@
-//! In: six small numbers. Out: a pose moved by them, the six that lead from one pose to another, and how a point
-//! follows. Two ways to read six numbers are two types, so that a covariance of one is not taken for the other's.
+//! In: six small numbers. Out: a pose moved by them, the six that lead from one pose to another, and how a point moves.
+//! The two meanings of six numbers are two types, so that a covariance of one is not mistaken for the other's.
 //! Frame and unit: the frame that the pose leads to; mm, rad (docs/math.md, Board pose).
 
 use super::{Frame, Mat3, Rigid, Vec3, exp, log, skew};
 use nalgebra::{Matrix3x6, Vector6};
 
-/// A motion of the whole body: a point P goes to exp(w) P + v, a pose to (exp(w), v) * pose. Small, that is P + v + w
-/// x P.
+/// A motion of the whole body: a point P goes to exp(w) P + v, a pose to (exp(w), v) * pose. For small motions, the
+/// point goes to P + v + w x P.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Twist {
-    /// mm.
+    /// Translation, mm.
     pub v: Vec3,
-    /// rad, about the frame's origin.
+    /// Rotation vector about the frame's origin, rad.
     pub w: Vec3,
 }
 
 impl Twist {
-    /// From (v, w); panics where there are fewer than six numbers.
+    /// From (v, w); panics for fewer than six numbers.
     pub fn new(s: &[f64]) -> Twist {
         Twist { v: Vec3::new(s[0], s[1], s[2]), w: Vec3::new(s[3], s[4], s[5]) }
     }
-    /// The one that leads from `from` to `to`.
+    /// The twist that leads from `from` to `to`.
     pub fn between<To: Frame, From: Frame>(from: &Rigid<To, From>, to: &Rigid<To, From>) -> Twist {
         let rotation = to.rotation * from.rotation.transpose();
         Twist { v: to.translation - rotation * from.translation, w: log(&rotation) }
     }
-    /// The steady motion that leads there within one unit of time, turning and shifting at once: of two places on one
-    /// screw the nearer has its share of the farther's. Rotations below half a turn.
+    /// The steady motion that leads to `to` within one unit of time, turning and shifting together. For two places on
+    /// one screw, the nearer one's motion is a share of the farther one's. Rotations below half a turn.
     pub fn steady<F: Frame>(to: &Rigid<F, F>) -> Twist {
         let w = log(&to.rotation);
         let (a, k) = (w.norm(), skew(&w));
-        // 1/12 is its limit; below 1e-3 rad it differs by less than 2e-9 of it.
+        // 1/12 is the limit at 0; below 1e-3 rad the exact value differs from it by less than 2e-9.
         let c = if a < 1e-3 { 1.0 / 12.0 } else { (1.0 - 0.5 * a / (0.5 * a).tan()) / (a * a) };
         Twist { v: to.translation - 0.5 * k * to.translation + c * k * k * to.translation, w }
     }
-    /// (v, w).
+    /// The six numbers (v, w).
     pub fn vector(&self) -> Vector6<f64> {
         Vector6::new(self.v.x, self.v.y, self.v.z, self.w.x, self.w.y, self.w.z)
     }
-    /// The pose moved by it.
+    /// The pose after this motion.
     pub fn moved<To: Frame, From: Frame>(&self, pose: &Rigid<To, From>) -> Rigid<To, From> {
         let e = exp(&self.w);
         Rigid::new(e * pose.rotation, e * pose.translation + self.v)
     }
-    /// By which a point is moved, to first order.
+    /// Displacement of a point, to first order.
     pub fn at(&self, p: &Vec3) -> Vec3 {
         self.v + self.w.cross(p)
     }
-    /// d(point) over (v, w) at the point `p`.
+    /// Derivative of a point by (v, w), at the point `p`.
     pub fn lever(p: &Vec3) -> Matrix3x6<f64> {
         translation_and_turn(p)
     }
 }
 
-/// A pose's two halves moved by themselves: t = t̂ + d, R = exp(r) R̂; the turn is about axes of the frame through
-/// the origin of what is posed.
+/// A pose's two halves moved separately: t = t̂ + d, R = exp(r) R̂. The turn is about axes of the frame through the
+/// origin of the posed object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeftStep {
-    /// mm.
+    /// Shift, mm.
     pub d: Vec3,
-    /// rad.
+    /// Rotation vector, rad.
     pub r: Vec3,
 }
 
 impl LeftStep {
-    /// From (d, r); panics where there are fewer than six numbers.
+    /// From (d, r); panics for fewer than six numbers.
     pub fn new(s: &[f64]) -> LeftStep {
         LeftStep { d: Vec3::new(s[0], s[1], s[2]), r: Vec3::new(s[3], s[4], s[5]) }
     }
-    /// The pose moved by it.
+    /// The pose after this step.
     pub fn moved<To: Frame, From: Frame>(&self, pose: &Rigid<To, From>) -> Rigid<To, From> {
         Rigid::new(exp(&self.r) * pose.rotation, pose.translation + self.d)
     }
-    /// d(point) over (d, r), for the point that the rotation alone takes to `rotated` = R X.
+    /// Derivative of a point by (d, r), where `rotated` = R X is the point after the rotation alone.
     pub fn lever(rotated: &Vec3) -> Matrix3x6<f64> {
         translation_and_turn(rotated)
     }
 }
 
-/// [1 | -p x].
+/// The matrix [1 | -p x].
 fn translation_and_turn(p: &Vec3) -> Matrix3x6<f64> {
     let mut j = Matrix3x6::zeros();
     j.fixed_view_mut::<3, 3>(0, 0).copy_from(&Mat3::identity());
@@ -91,7 +91,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Board, Camera};
 
-    /// Levers against differences, for a pose far from the origin, where the two readings differ most.
+    /// Levers compared with differences, for a pose far from the origin, where the two meanings differ most.
     #[test]
     fn points_follow_their_levers() {
         let pose: Rigid<Camera, Board> = Rigid::from_vectors(&Vec3::new(0.4, -0.9, 1.3), Vec3::new(30.0, -40.0, 300.0));
@@ -110,7 +110,7 @@ mod tests {
         assert!((twist.column(4) - left.column(4)).norm() > 100.0, "two readings, two types");
     }
 
-    /// Steps of one screw, one after the other.
+    /// Repeated steps of one screw.
     #[test]
     fn places_on_a_screw_lie_in_proportion() {
         for turn in [Vec3::new(0.02, -0.05, 0.01), Vec3::new(1e-4, 0.0, 0.0), Vec3::zeros()] {

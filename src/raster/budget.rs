@@ -1,16 +1,17 @@
-//! In: what each thread is about to decode. Out: the right to, so that all of them together stay within one limit.
+//! In: the size of what each thread is about to decode. Out: permission to decode it, so that all threads together stay
+//! within one limit.
 //! Frame and unit: bytes.
 
 use std::sync::{Condvar, Mutex, PoisonError};
 
-/// Memory that is given out in parts.
+/// Memory that is lent in parts.
 pub struct Budget {
     left: Mutex<u64>,
     returned: Condvar,
     most: u64,
 }
 
-/// A part; goes back when it is dropped.
+/// A part of the budget; it is returned when it is dropped.
 pub struct Part<'a> {
     budget: &'a Budget,
     bytes: u64,
@@ -21,8 +22,8 @@ impl Budget {
         Budget { left: Mutex::new(most), returned: Condvar::new(), most }
     }
 
-    /// Waits until so much is left. Who asks for more than there is gets all of it: one picture of any size is decoded
-    /// alone. What is held must not wait for another part.
+    /// Waits until this number of bytes is left. A request above the limit gets the whole budget: one picture of any
+    /// size is decoded alone. A thread that holds a part must not wait for another.
     pub fn hold(&self, bytes: u64) -> Part<'_> {
         let bytes = bytes.min(self.most);
         let left = self.left.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,5 +1,5 @@
-//! In: a number from 0 to 1. Out: a colour whose lightness grows evenly with it, so that the eye
-//! orders heights rightly and grey prints stay readable.
+//! In: a number from 0 to 1. Out: a colour whose lightness grows evenly with it, so that the eye orders heights
+//! correctly and grey prints stay readable.
 //! Frame and unit: sRGB.
 
 use super::Rgb;

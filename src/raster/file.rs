@@ -1,4 +1,4 @@
-//! Makes grey images with the depth the sensor had of picture files, grey or colour.
+//! Makes grey images with the sensor's depth from picture files, grey or colour.
 
 use super::samples::{Kind, Samples, Values, Wanted, read_samples};
 use super::size::MOST_PIXELS;
@@ -6,7 +6,7 @@ use super::{Image, Mask, Pixels};
 use crate::fault::{Fault, Result};
 use std::path::Path;
 
-/// Which part of a colour picture is taken as grey. A grey picture ignores it.
+/// Which part of a colour picture is used as grey. A grey picture ignores it.
 #[derive(
     Clone,
     Copy,
@@ -38,12 +38,12 @@ fn unknown(word: &str) -> String {
     crate::fault::unknown::<Channel>("channel", word)
 }
 
-/// How deep the pictures are that are wanted, and who says so.
+/// The required depth of pictures, and who requires it.
 #[derive(Clone, Copy, Debug)]
 pub struct Depth {
     /// 8, or 9..=16 for 16-bit files.
     pub bits: u8,
-    /// Who says so, with its verb: "the recording declares".
+    /// Who states the depth, with the verb: "the recording declares".
     pub declared: &'static str,
     /// What to do about a picture of another depth.
     pub correct: &'static str,
@@ -60,20 +60,20 @@ pub fn load(path: &Path, channel: Channel, depth: impl Into<Depth>) -> Result<Im
     read(path, channel, depth.into(), None)
 }
 
-/// Reads a picture whose width and height are known; of another size none is decoded.
+/// Reads a picture whose width and height are known; a picture of another size is refused before it is decoded.
 pub fn load_sized(path: &Path, channel: Channel, depth: impl Into<Depth>, size: [u32; 2]) -> Result<Image> {
     read(path, channel, depth.into(), Some(size))
 }
 
 fn read(path: &Path, channel: Channel, depth: Depth, size: Option<[u32; 2]>) -> Result<Image> {
-    // Four channels of 16 bits, uncompressed, and what cameras write before them.
+    // Four channels of 16 bits, uncompressed, and the headers that cameras write before them.
     let pixels = size.map_or(MOST_PIXELS, |[w, h]| u64::from(w) * u64::from(h));
     let bytes = crate::files::read(path, 8 * pixels + (16 << 20))?;
     let shown = whole(shown(&bytes, channel, depth, size));
     shown.map_err(|e| e.at(path.display()))
 }
 
-/// Reads a picture of any size, of which a part may be hidden: where it is, the mask is lit.
+/// Reads a picture of any size that may be hidden in part; the mask is set where it is hidden.
 pub fn load_in_part(path: &Path, channel: Channel, depth: impl Into<Depth>) -> Result<(Image, Option<Mask>)> {
     let bytes = crate::files::read(path, 8 * MOST_PIXELS + (16 << 20))?;
     decode_in_part(&bytes, channel, depth).map_err(|e| e.at(path.display()))
@@ -84,12 +84,12 @@ pub fn decode(bytes: &[u8], channel: Channel, depth: impl Into<Depth>) -> Result
     whole(shown(bytes, channel, depth.into(), None))
 }
 
-/// Decodes a picture held in memory, of which a part may be hidden: where it is, the mask is lit.
+/// Decodes a picture held in memory that may be hidden in part; the mask is set where it is hidden.
 pub fn decode_in_part(bytes: &[u8], channel: Channel, depth: impl Into<Depth>) -> Result<(Image, Option<Mask>)> {
     shown(bytes, channel, depth.into(), None)
 }
 
-/// Refuses pictures with hidden pixels: what lies under them was not meant to be seen.
+/// Refuses pictures with hidden pixels: what lies under them is not meant to be seen.
 fn whole(shown: Result<(Image, Option<Mask>)>) -> Result<Image> {
     match shown? {
         (image, None) => Ok(image),
@@ -114,7 +114,7 @@ fn shown(bytes: &[u8], channel: Channel, depth: Depth, size: Option<[u32; 2]>) -
     Ok((image(samples, channel, depth)?, hidden))
 }
 
-/// Pixels that the file hides, or whose level it names as missing.
+/// Pixels that the file hides, or whose level it declares as missing.
 fn hidden(samples: &Samples) -> Option<Mask> {
     let Some(missing) = samples.says.missing else { return samples.hidden.clone() };
     let (width, channels) = (samples.width as usize, samples.channels);
@@ -127,8 +127,8 @@ fn hidden(samples: &Samples) -> Option<Mask> {
     (mask.count() > 0).then_some(mask)
 }
 
-/// The picture of samples that are shades: levels of fewer than 8 bits are stretched to 8, since the largest is
-/// saturation; where white is 0 they are turned round.
+/// The picture of samples that are grey levels. Levels of fewer than 8 bits are stretched to 8, since the largest is
+/// saturation; where white is 0 they are inverted.
 fn image(samples: Samples, channel: Channel, depth: Depth) -> Result<Image> {
     let Samples { width, height, channels, kind, values, says, .. } = samples;
     let stored = match (kind, &values) {
@@ -201,7 +201,8 @@ fn mixed([r, g, b]: [u16; 3], channel: Channel) -> u16 {
     }
 }
 
-/// Writes a grey image as PNG, 8 or 16 bits. Not waited for: recordings are simulated by hundreds of pictures.
+/// Writes a grey image as PNG, 8 or 16 bits. It does not wait for the disk: a simulated recording has hundreds of
+/// pictures.
 pub fn save_png(image: &Image, path: &Path) -> Result<()> {
     crate::files::write_unsynced(path, &png(image))
 }

@@ -1,4 +1,4 @@
-//! In: float values on a grid. Out: a single-channel 32-bit float TIFF, and the way back.
+//! In: float values on a grid. Out: a single-channel 32-bit float TIFF; and the reverse.
 //! Frame and unit: the caller's; NaN stays NaN.
 
 use super::samples::{Kind, Values, Wanted, read_samples};

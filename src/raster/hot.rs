@@ -1,34 +1,35 @@
-//! In: several pictures of one camera. Out: pixels that shine in all of them by themselves.
+//! In: several pictures of one camera. Out: its hot pixels, which are bright in all of them whatever the scene.
 //! Frame and unit: px; grey levels of the pictures' depth.
 
 use super::{Image, Pixels};
 
-/// Pixels that shine in every picture and whose neighbours do not. On the flank of a wide stripe one moves the centre
-/// of two dozen lines by a tenth of a pixel, in every shot of a flat surface. In rows from the top, each from the left.
+/// Pixels that are bright in every picture while their neighbours are not. On the flank of a wide stripe, a hot pixel
+/// moves the centre of two dozen lines by a tenth of a pixel, in every shot of a flat surface. Sorted by rows from the
+/// top, each from the left.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(transparent)]
 pub struct HotPixels(Vec<[u32; 2]>);
 
-/// Pictures that tell a hot pixel from a glint, at least, and the share of them, in quarters, in which it must stand
-/// out: a stripe may lie on it in the others.
+/// Least number of pictures that distinguishes a hot pixel from a glint, and the share of them, in quarters, in which
+/// it must stand out: in the others a stripe may lie on it.
 const PICTURES: usize = 3;
 const QUARTERS: usize = 3;
-/// What stands out, over what is beside it: standard deviations of a dark pixel, share of full scale.
+/// How far a pixel must stand out from its neighbours: standard deviations of a dark pixel, share of full scale.
 const SIGMAS: f32 = 8.0;
 const SHARE: f32 = 0.02;
-/// More are no sensor's: what is looked at is not a stripe in the dark. Per million.
+/// No sensor has more hot pixels than this, per million: the scene is then not a stripe in the dark.
 const MOST: usize = 10_000;
 
 impl HotPixels {
-    /// Those of pictures whose dark pixels scatter by `noise` grey levels of an 8-bit picture. Empty for fewer than
-    /// three pictures: in one alone a speck of light on the part looks the same.
+    /// The hot pixels of pictures whose dark pixels scatter by `noise` grey levels of an 8-bit picture. Empty for fewer
+    /// than three pictures: in a single one, a speck of light on the part looks the same.
     pub fn find(pictures: &[&Image], noise: f32) -> HotPixels {
         let Some((first, others)) = pictures.split_first() else { return HotPixels::default() };
         if pictures.len() < PICTURES {
             return HotPixels::default();
         }
         let over = over(first, noise);
-        // Two pictures: where a stripe lies on it in the one it may not in the other.
+        // Candidates come from two pictures: a stripe that covers a hot pixel in one may leave it free in the other.
         let mut found = standing_out(first, over);
         found.extend(standing_out(others[others.len() - 1], over));
         found.sort_unstable_by_key(|[x, y]| (*y, *x));
@@ -38,7 +39,8 @@ impl HotPixels {
         HotPixels(few_enough(found, first.pixel_count()))
     }
 
-    /// Those of many pictures that are looked at one by one: of each picture what [`HotPixels::may_be`] gave.
+    /// The hot pixels of many pictures that are examined one by one; `each` holds the result of [`HotPixels::may_be`]
+    /// for each.
     pub fn of_all(each: &[Vec<[u32; 2]>], pixel_count: usize) -> HotPixels {
         if each.len() < PICTURES {
             return HotPixels::default();
@@ -50,12 +52,12 @@ impl HotPixels {
         HotPixels(few_enough(found, pixel_count))
     }
 
-    /// The pixels of one picture that stand out: hot ones, and specks of light.
+    /// The pixels of one picture that stand out: hot pixels, and specks of light.
     pub fn may_be(image: &Image) -> Vec<[u32; 2]> {
         standing_out(image, over(image, 0.0))
     }
 
-    /// Those of a list that was stored, in any order.
+    /// The hot pixels of a stored list, in any order.
     pub fn stored(places: &[[u32; 2]]) -> HotPixels {
         let mut places = places.to_vec();
         places.sort_unstable_by_key(|[x, y]| (*y, *x));
@@ -63,18 +65,18 @@ impl HotPixels {
         HotPixels(places)
     }
 
-    /// Columns and rows, px, in rows from the top, each from the left.
+    /// Columns and rows, px; sorted by rows from the top, each from the left.
     pub fn places(&self) -> &[[u32; 2]] {
         &self.0
     }
 
-    /// How many there are.
+    /// Number of hot pixels.
     pub fn count(&self) -> usize {
         self.0.len()
     }
 
-    /// Puts the mean of the two neighbours along the stripe in their places; of one that is hot itself the other
-    /// one's. Pixels beyond the picture are passed over. `along`: the step to the next pixel of the stripe, columns
+    /// Replaces each hot pixel by the mean of its two neighbours along the stripe, or by one of them if the other is
+    /// hot. Pixels at the border or beyond it are skipped. `along`: the step to the next pixel of the stripe, columns
     /// and rows, 0 or 1 each.
     pub fn fill(&self, image: &mut Image, [dx, dy]: [u32; 2]) {
         let (w, h) = (image.width, image.height);
@@ -86,7 +88,7 @@ impl HotPixels {
             let good = |p: &[u32; 2]| self.0.binary_search_by_key(&(p[1], p[0]), |q| (q[1], q[0])).is_err();
             let level = |p: &[u32; 2]| u32::from(image.get(p[0], p[1]));
             let levels: Vec<u32> = beside.iter().filter(|p| good(p)).map(level).collect();
-            // Both hot: what stands there is no worse than either.
+            // Both are hot: the pixel's own level is no worse than theirs.
             let Some(mean) = levels.iter().sum::<u32>().checked_div(levels.len() as u32) else { continue };
             let i = (y * w + x) as usize;
             match &mut image.pixels {
@@ -97,13 +99,13 @@ impl HotPixels {
     }
 }
 
-/// Grey levels by which a hot pixel stands out where dark ones scatter by `noise` levels of an 8-bit picture.
+/// Grey levels by which a hot pixel stands out where dark pixels scatter by `noise` levels of an 8-bit picture.
 fn over(image: &Image, noise: f32) -> u32 {
     let full = f32::from(image.full_scale());
     (SHARE * full).max(SIGMAS * noise * full / 255.0).ceil() as u32
 }
 
-/// None where they are too many for a sensor.
+/// The list, or an empty one if it has too many pixels for a sensor.
 fn few_enough(found: Vec<[u32; 2]>, pixel_count: usize) -> Vec<[u32; 2]> {
     if found.len() > MOST * pixel_count / 1_000_000 { Vec::new() } else { found }
 }
@@ -127,8 +129,8 @@ fn standing_out(image: &Image, over: u32) -> Vec<[u32; 2]> {
     out
 }
 
-/// Brighter by so much than all its neighbours but one (hot pixels come in pairs), and more than twice as bright over
-/// the darkest as they are: a grain of speckle has others beside it.
+/// True for a pixel that exceeds all its neighbours but one by `over` (hot pixels come in pairs). Its height above the
+/// darkest neighbour must also be more than twice theirs: a grain of speckle has others beside it.
 fn stands_out(image: &Image, [x, y]: [u32; 2], over: u32) -> bool {
     let here = u32::from(image.get(x, y));
     let (mut dark, mut first, mut second) = (u32::MAX, 0, 0);
@@ -149,7 +151,7 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
 
-    /// A stripe that moves over a noisy sensor with hot pixels, one of them on its way, two beside each other.
+    /// A stripe that moves over a noisy sensor with hot pixels: some lie on its path, two lie side by side.
     fn pictures(hot: &[[u32; 2]], along: [u32; 2]) -> Vec<Image> {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(1);
         (0..8)

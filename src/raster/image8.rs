@@ -10,9 +10,9 @@ pub type Rgb = [u8; 3];
 /// A colour picture, row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RgbImage {
-    /// px
+    /// Width, px.
     pub width: u32,
-    /// px
+    /// Height, px.
     pub height: u32,
     /// Rows from the top, each from the left, `width * height` colours.
     pub pixels: Vec<Rgb>,
@@ -27,7 +27,7 @@ impl RgbImage {
     pub fn from_grey(image: &super::Image) -> RgbImage {
         RgbImage { width: image.width, height: image.height, pixels: image.to_u8().iter().map(|&v| [v; 3]).collect() }
     }
-    /// Colours one pixel; outside the picture does nothing.
+    /// Colours one pixel; a place outside the picture is ignored.
     pub fn set(&mut self, x: i64, y: i64, colour: Rgb) {
         if (0..i64::from(self.width)).contains(&x) && (0..i64::from(self.height)).contains(&y) {
             self.pixels[y as usize * self.width as usize + x as usize] = colour;
@@ -45,7 +45,7 @@ impl RgbImage {
             );
         }
     }
-    /// PNG bytes, for files and for pages that carry their pictures inside.
+    /// PNG bytes, for files and for pages that embed their pictures.
     pub fn to_png(&self) -> Vec<u8> {
         let mut out = std::io::Cursor::new(Vec::new());
         image::write_buffer_with_format(
@@ -59,7 +59,7 @@ impl RgbImage {
         .expect("memory takes every picture");
         out.into_inner()
     }
-    /// Writes a PNG file; one of that name is replaced when the new one is whole.
+    /// Writes a PNG file; an existing file of that name is replaced once the new one is complete.
     pub fn save_png(&self, path: &Path) -> Result<()> {
         crate::files::write(path, &self.to_png())
     }

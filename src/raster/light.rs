@@ -1,16 +1,17 @@
-//! In: a picture in which no stripe was found. Out: what its light is like, in words for a message: levels, saturation,
-//! where the brightest light lies and how it is shaped. Frame and unit: pixels, grey levels.
+//! In: a picture in which no stripe was found. Out: a description of its light for a message: levels, saturation,
+//! position and shape of the brightest light.
+//! Frame and unit: pixels, grey levels.
 
 use super::Image;
 use crate::fault::Fault;
 use std::fmt;
 
-/// What a picture's light is like.
+/// A description of a picture's light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
-    /// px
+    /// Width, px.
     pub width: u32,
-    /// px
+    /// Height, px.
     pub height: u32,
     /// Darkest, median and brightest level.
     pub levels: [u16; 3],
@@ -25,10 +26,10 @@ pub struct Light {
 /// Light that stands out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bright {
-    /// Middle of it, px, and its share of the picture.
+    /// Its middle, px, and its share of the picture.
     pub centre: [f64; 2],
     pub share: f64,
-    /// A stripe along the rows or the columns, so many px thick; `None` where it has no such shape.
+    /// A stripe along the rows or the columns; `None` if the light has no such shape.
     pub stripe: Option<Stripe>,
 }
 
@@ -36,26 +37,26 @@ pub struct Bright {
 pub struct Stripe {
     pub upright: bool,
     pub thickness_px: f64,
-    /// From its middle to the nearest border that it runs along, px.
+    /// Distance from its middle to the nearest border that it runs along, px.
     pub to_border_px: f64,
 }
 
 /// Levels (of 255) by which light must stand out from the median to count.
 const OUT: f64 = 10.0;
-/// A stripe crosses this share of the rows or columns, and is this many times longer than thick.
+/// A stripe crosses more than this share of the rows or columns, and is more than this many times longer than thick.
 const CROSSES: f64 = 0.3;
 const SLENDER: f64 = 3.0;
 
 /// A picture whose brightest pixel is below this share of full scale is dark.
 const DARK: f64 = 0.06;
-/// A picture is white with more than this share of its pixels saturated, or with its median above that share of full
-/// scale and nothing dark in it: black print on white paper is not.
+/// A picture is white if more than the first share of its pixels is saturated. It is also white if its median lies
+/// above the second share of full scale and its darkest level above the third: black print on white paper is not white.
 const WHITE: f64 = 0.2;
 const BRIGHT: f64 = 0.9;
 const NO_DARK: f64 = 0.5;
 
 impl Light {
-    /// Looks at every pixel of a picture.
+    /// Examines every pixel of a picture.
     pub fn of(image: &Image) -> Light {
         let full = image.full_scale();
         let mut counts = vec![0u64; usize::from(full) + 1];
@@ -85,8 +86,7 @@ impl Light {
 }
 
 impl Light {
-    /// Likely cause and next step where the light is what is wrong: hardly any, or far too much. `None` where it is
-    /// neither.
+    /// Likely cause and next step if the light is at fault: hardly any, or far too much. `None` otherwise.
     pub fn why(&self) -> Option<(&'static str, &'static str)> {
         let full = f64::from(self.full_scale);
         if f64::from(self.levels[2]) < DARK * full {
@@ -99,7 +99,7 @@ impl Light {
         white.then_some((why, "expose shorter, or shade it"))
     }
 
-    /// Adds to a fault what the picture `name` shows; where its light is what is wrong, that is the cause.
+    /// Adds to a fault what the picture `name` shows; if its light is at fault, that becomes the cause.
     pub fn explain(&self, name: &str, mut fault: Fault) -> Fault {
         fault.what = format!("{}; {name}: {self}", fault.what);
         match self.why() {
@@ -126,7 +126,7 @@ impl Bright {
         let centre = [middle(&columns), middle(&rows)];
         let crossed = |counts: &[u32]| counts.iter().filter(|n| **n > 0).count() as f64;
         let (along_x, along_y) = (crossed(&columns), crossed(&rows));
-        // Along the axis in which more lines are crossed, relative to the picture.
+        // Upright if it crosses a larger share of the rows than of the columns.
         let upright = along_y / h as f64 > along_x / w as f64;
         let (length, size, centre_across, across) =
             if upright { (along_y, h, centre[0], w) } else { (along_x, w, centre[1], h) };

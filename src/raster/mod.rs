@@ -30,9 +30,9 @@ pub use text::text_width;
 /// Grey levels, row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Pixels {
-    /// Of a sensor of 8 bits.
+    /// Levels of a sensor of 8 bits.
     U8(Vec<u8>),
-    /// Of a sensor of 9..=16 bits, not stretched to 16.
+    /// Levels of a sensor of 9..=16 bits, not stretched to 16.
     U16(Vec<u16>),
 }
 
@@ -40,9 +40,9 @@ pub enum Pixels {
 /// a pixel never exceeds `2^bits - 1`, which is saturation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
-    /// px
+    /// Width, px.
     pub width: u32,
-    /// px
+    /// Height, px.
     pub height: u32,
     /// Depth of the sensor, 8..=16.
     pub bits: u8,
@@ -85,7 +85,7 @@ impl Image {
             Pixels::U16(p) => p.iter().map(|&v| f32::from(v)).collect(),
         }
     }
-    /// The 8 most significant bits, for looking at and for detectors that want 8 bits.
+    /// The 8 most significant bits, for display and for detectors that need 8 bits.
     pub fn to_u8(&self) -> Vec<u8> {
         match &self.pixels {
             Pixels::U8(p) => p.clone(),

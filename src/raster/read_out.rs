@@ -1,5 +1,5 @@
-//! In: the hot pixels of two sets of pictures of one size. Out: whether both sets were read from the sensor alike, and
-//! if not, how the second differs from the first.
+//! In: the hot pixels of two sets of pictures of one size. Out: whether both sets were read out of the sensor in the
+//! same way, and if not, how the second differs from the first.
 //! Frame and unit: px, columns before rows.
 
 use super::HotPixels;
@@ -9,47 +9,47 @@ use std::collections::{HashMap, HashSet};
 /// How pictures differ from others of the same camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReadOut {
-    /// Mirrored or turned: rows and columns exchanged first, then the order of columns and of rows reversed. `moved`:
-    /// what is left after that.
+    /// Mirrored or turned: rows and columns are exchanged first, then the order of columns and of rows is reversed.
+    /// `moved` is the shift that remains after that.
     Turned {
         /// Rows and columns are exchanged.
         transposed: bool,
-        /// The order of columns, of rows.
+        /// Whether the order of columns, and of rows, is reversed.
         reversed: [bool; 2],
-        /// Of the second set against the first, px.
+        /// Shift of the second set relative to the first, px.
         moved: [i32; 2],
     },
-    /// The two sets have no more hot pixels in common than two sensors', however they are turned or moved.
+    /// The two sets have no more hot pixels in common than those of two sensors, however they are turned or moved.
     Another,
 }
 
-/// How far two readings of one picture agree.
+/// How the read-out of two sets of pictures differs, and on what evidence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Otherwise {
-    /// What the second set is of the first.
+    /// How the second set differs from the first.
     pub how: ReadOut,
-    /// Hot pixels that lie where this says, and the smaller set's number of them.
+    /// Number of hot pixels that agree with this, and number of those in the smaller set.
     pub alike: [usize; 2],
 }
 
-/// Hot pixels that must lie alike: at least this many where the picture is only turned, and where it is moved too.
+/// Least number of hot pixels that must agree where the picture is only turned, and where it is also moved.
 const FEWEST_TURNED: usize = 2;
 const FEWEST_MOVED: usize = 3;
-/// And this share of the smaller set, in tenths: long lists agree somewhere by chance.
+/// At least this share of the smaller set, in tenths, must agree too: long lists agree somewhere by chance.
 const TENTHS: usize = 3;
-/// Hot pixels of each set from which on it says something that no more of them agree than two sensors' do by chance;
-/// more than this multiple of what chance gives on average are no chance.
+/// Least number of hot pixels in each set for the verdict that the sensors differ. The second is a multiple of the mean
+/// number that agrees by chance: more than that is not chance.
 const FEWEST_OF_ANOTHER: usize = 4;
 const MORE_THAN_CHANCE: f64 = 4.0;
-/// Of a longer calibrated list these many, evenly taken, are compared: every pair is looked at.
+/// Most entries of a longer calibrated list that are compared, evenly chosen: every pair is examined.
 const MOST: usize = 400;
 
 impl HotPixels {
     /// How pictures with these hot pixels differ from pictures with those of `calibrated`, both `size` large. `None`:
-    /// they do not, or there are too few to tell.
+    /// they do not differ, or there are too few hot pixels to decide.
     ///
-    /// The places of hot pixels belong to the sensor: with a dozen in 640x480, two that are turned or three that are
-    /// moved agree by chance in one of a million sets.
+    /// The positions of hot pixels are a property of the sensor. With a dozen in 640x480, two that agree after a turn,
+    /// or three after a move, occur by chance in one of a million sets.
     pub fn otherwise(&self, calibrated: &HotPixels, size: [u32; 2]) -> Option<Otherwise> {
         let step = calibrated.count().div_ceil(MOST).max(1);
         let calibrated: Vec<[u32; 2]> = calibrated.places().iter().copied().step_by(step).collect();
@@ -77,10 +77,10 @@ impl HotPixels {
 }
 
 impl Otherwise {
-    /// A sentence on pictures that may be of another sensor.
+    /// A sentence on pictures that may come from another sensor.
     ///
     /// # Errors
-    /// The pictures are turned, mirrored or moved: what was calibrated does not hold for them.
+    /// The pictures are turned, mirrored or moved: the calibration does not hold for them.
     pub fn remark(&self) -> Result<String> {
         let [alike, of] = self.alike;
         match self.how {
@@ -98,12 +98,13 @@ impl Otherwise {
     }
 }
 
-/// All ways to turn and mirror a picture that keep its size, the picture as it is first.
+/// All turns and mirrorings of a picture that preserve its size; the unchanged picture is first.
 fn orientations([w, h]: [u32; 2]) -> impl Iterator<Item = (bool, [bool; 2])> {
     (0..if w == h { 8 } else { 4 }).map(|i| (i & 4 != 0, [i & 1 != 0, i & 2 != 0]))
 }
 
-/// The most frequent move from a calibrated hot pixel, turned like this, to a seen one, and the pairs that have it.
+/// The most frequent move from a calibrated hot pixel, turned in this way, to a seen one, and the number of pairs with
+/// it.
 fn best_move(
     seen: &[[u32; 2]],
     calibrated: &[[u32; 2]],
@@ -119,7 +120,7 @@ fn best_move(
     for [a, b] in signed(calibrated).map(turned) {
         signed(seen).for_each(|[x, y]| *votes.entry([x - a, y - b]).or_default() += 1);
     }
-    // Of equal ones the smallest move, then the first in order: the same answer each time.
+    // Among equal counts the smallest move is taken, then the first in order: the answer is the same each time.
     let smallest = |[x, y]: [i32; 2]| (x.abs() + y.abs(), x, y);
     let best = votes.into_iter().max_by_key(|(moved, n)| (*n, std::cmp::Reverse(smallest(*moved))));
     best.unwrap_or(([0; 2], 0))
@@ -177,10 +178,10 @@ mod tests {
         let known = hot(&SENSOR, SIZE);
         assert_eq!(known.count(), 6);
         assert_eq!(known.otherwise(&known, SIZE), None);
-        // Half of them hidden, others come in addition: a longer exposure, a warmer sensor.
+        // Half of them are hidden and others are added: a longer exposure, a warmer sensor.
         let warmer = [&SENSOR[..3], &[[20, 20], [21, 44], [50, 3], [9, 9]]].concat();
         assert_eq!(hot(&warmer, SIZE).otherwise(&known, SIZE), None);
-        // Too few to tell.
+        // Too few to decide.
         assert_eq!(hot(&[[20, 20], [50, 3]], SIZE).otherwise(&known, SIZE), None);
         assert_eq!(HotPixels::default().otherwise(&known, SIZE), None);
         assert_eq!(known.otherwise(&HotPixels::default(), SIZE), None);
@@ -202,7 +203,7 @@ mod tests {
         assert_eq!(right.otherwise(&square, [64, 64]).unwrap().how.to_string(), "turned by 90 degrees to the right");
     }
 
-    /// Lists that have nothing in common agree somewhere by chance: no turn or move may be named for that.
+    /// Lists that have nothing in common agree somewhere by chance: no turn or move may be reported for that.
     #[test]
     fn long_lists_of_two_sensors_are_told_to_be_two() {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(5);

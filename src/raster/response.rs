@@ -1,6 +1,6 @@
-//! In: pictures of a camera that bends its levels (sRGB, a gamma). Out: the same pictures with levels in proportion
-//! to the light, through a table.
-//! Frame and unit: grey levels; 8 bits become 12, deeper ones 16, so that dark levels stay apart.
+//! In: pictures of a camera whose levels are not proportional to the light (sRGB, a gamma). Out: the same pictures with
+//! levels proportional to the light, through a table.
+//! Frame and unit: grey levels; 8 bits become 12, deeper ones 16, so that dark levels stay distinct.
 
 use super::{Image, Pixels};
 
@@ -8,7 +8,7 @@ use super::{Image, Pixels};
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(try_from = "Stated", into = "Stated")]
 pub enum Response {
-    /// In proportion.
+    /// Proportional to the light.
     Linear,
     /// IEC 61966-2-1.
     Srgb,
@@ -16,7 +16,7 @@ pub enum Response {
     Gamma(f64),
 }
 
-/// As a file says it: a name or a number.
+/// As a file states it: a name or a number.
 #[derive(serde::Serialize, serde::Deserialize)]
 #[serde(untagged)]
 enum Stated {
@@ -59,7 +59,7 @@ impl Response {
         }
     }
 
-    /// Light, as a share of full scale, that gives a level.
+    /// The light that gives a level, both as shares of full scale.
     fn light(self, level: f64) -> f64 {
         match self {
             Response::Linear => level,
@@ -69,7 +69,7 @@ impl Response {
         }
     }
 
-    /// The picture with levels in proportion to the light; saturated pixels stay saturated.
+    /// The picture with levels proportional to the light; saturated pixels stay saturated.
     pub fn linear(self, image: Image) -> Image {
         if self == Response::Linear {
             return image;
@@ -85,7 +85,7 @@ impl Response {
         Image::from_u16(image.width, image.height, bits, levels)
     }
 
-    /// What a report says of pictures that were made linear.
+    /// Remark for a report on pictures that were made linear.
     pub fn remark(self, bits: u8) -> Option<String> {
         let name = match self {
             Response::Linear => return None,

@@ -3,11 +3,11 @@
 
 use crate::fault::{Fault, Result};
 
-/// Longest side of a picture, px: stages pack a place into two numbers of 16 bits.
+/// Longest side of a picture, px: stages pack a position into two numbers of 16 bits.
 pub const MOST_SIDE: u32 = 65_535;
 /// Most pixels of a picture; the largest sensors have 250 million.
 pub const MOST_PIXELS: u64 = 1 << 28;
-/// Refuses another size than the known one, before anything is decoded.
+/// Refuses a size other than the known one, or above the limits, before anything is decoded.
 pub(super) fn fits(width: u32, height: u32, size: Option<[u32; 2]>) -> Result<()> {
     match size {
         Some([w, h]) if [w, h] != [width, height] => {

@@ -101,7 +101,7 @@ const GLYPHS: [u64; 95] = [
     0x0041360800,
     0x0201020402,
 ];
-/// The few others that units need.
+/// Further characters that units need.
 const EXTRA: [(char, u64); 5] =
     [('±', 0x44445f4444), ('µ', 0xfc20201c20), ('°', 0x0006090906), ('²', 0x0012191612), ('×', 0x0028102800)];
 
@@ -116,8 +116,8 @@ pub fn text_width(text: &str, scale: u32) -> i64 {
 }
 
 impl RgbImage {
-    /// Draws `text` with its top left corner at (x, y); what lies outside the picture is cut off.
-    /// Unknown characters show as a question mark.
+    /// Draws `text` with its top left corner at (x, y); what lies outside the picture is cut off. Unknown characters
+    /// appear as a question mark.
     pub fn text(&mut self, x: i64, y: i64, scale: u32, colour: Rgb, text: &str) {
         let s = i64::from(scale);
         for (i, c) in text.chars().enumerate() {

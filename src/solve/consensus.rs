@@ -1,5 +1,5 @@
-//! In: a way to fit a model to a few samples and to measure its misfit, and a seed. Out: the model
-//! that most samples agree with, and which they are.
+//! In: a way to fit a model to a few samples and to measure its misfit, and a seed. Out: the model that most samples
+//! agree with, and the indices of these samples.
 //! Frame and unit: none; misfits in the unit of the threshold.
 
 use crate::fault::{Fault, Result};
@@ -8,13 +8,13 @@ use rand::SeedableRng;
 /// Settings of [`consensus`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConsensusOptions {
-    /// A sample agrees with the model below this misfit; positive.
+    /// Misfit below which a sample agrees with the model; positive.
     pub threshold: f64,
-    /// Wanted probability of having drawn one clean set; 0.5..1.
+    /// Required probability that at least one clean set is drawn; 0.5..1.
     pub confidence: f64,
-    /// Draws at most; 1..=1_000_000.
+    /// Most draws; 1..=1_000_000.
     pub max_draws: usize,
-    /// Same seed, same result.
+    /// The same seed gives the same result.
     pub seed: u64,
 }
 
@@ -45,16 +45,16 @@ impl ConsensusOptions {
 /// The winner of a [`consensus`].
 #[derive(Clone, Debug)]
 pub struct Consensus<M> {
-    /// As `fit` made it of the best draw; it is not fitted to the inliers.
+    /// The model that `fit` made of the best draw; it is not fitted to the inliers.
     pub model: M,
     /// Indices of the samples that agree, ascending.
     pub inliers: Vec<usize>,
-    /// Sets of samples that were drawn, degenerate ones included.
+    /// Number of sets that were drawn, degenerate ones included.
     pub draws: usize,
 }
 
-/// RANSAC \[fischler81\] with truncated squared misfits as score (MSAC) and a number of draws that
-/// adapts to the share of inliers. `fit` gets `size` different indices; `None` for degenerate ones.
+/// RANSAC \[fischler81\] with truncated squared misfits as score (MSAC) and a number of draws that adapts to the share
+/// of inliers. `fit` gets `size` different indices and returns `None` for degenerate ones.
 pub fn consensus<M>(
     count: usize,
     size: usize,
@@ -76,7 +76,7 @@ pub fn consensus<M>(
         let (mut score, mut agree) = (0.0, 0usize);
         for i in 0..count {
             let m = misfit(&model, i);
-            // NaN disagrees.
+            // NaN counts as disagreement.
             if m * m < limit {
                 agree += 1;
                 score += m * m;
@@ -95,8 +95,9 @@ pub fn consensus<M>(
     Some(Consensus { model, inliers, draws })
 }
 
-/// Draws that give one clean set with this probability, where a share `clean` of all sets is. `ln_1p` keeps the digits
-/// of a share that 1 - clean would round away: without it a share below 1e-16 would need no draw at all.
+/// Number of draws that give one clean set with this probability, if the share `clean` of all sets is clean. `ln_1p`
+/// keeps the digits of a share that 1 - clean would round away: without it a share below 1e-16 would need no draw at
+/// all.
 fn draws_needed(clean: f64, confidence: f64) -> usize {
     if clean >= 1.0 - 1e-12 {
         return 0;
@@ -144,7 +145,7 @@ mod tests {
         for rare in [1e-9, 1e-17, 1e-300, 0.0] {
             assert_eq!(draws_needed(rare, 0.9999), 1_000_000_000, "{rare}");
         }
-        // Only the model 7 fits, and the draw that gives it is one in forty.
+        // Only the model 7 fits; one draw in forty gives it.
         let options = ConsensusOptions { threshold: 0.5, seed: 3, ..Default::default() };
         let misfit = |m: &usize, _: usize| if *m == 7 { 0.1 } else { 9.0 };
         let found = consensus(40, 1, &options, |c| Some(c[0]), misfit).unwrap();

@@ -8,10 +8,10 @@ use super::{Loss, Residuals};
 use crate::fault::{Fault, Result};
 use nalgebra::DMatrix;
 
-/// Something to minimise. A state lives where it likes (rotations included); a step is a vector of
-/// `width` numbers, and Jacobians are derivatives by such a step at zero.
+/// A problem to minimise. A state may lie on any manifold (rotations included); a step is a vector of `width` numbers,
+/// and Jacobians are derivatives by such a step at zero.
 pub trait Problem {
-    /// What is estimated.
+    /// The estimated quantity.
     type State: Clone;
     /// Number of parameters of a step.
     fn width(&self) -> usize;
@@ -20,7 +20,7 @@ pub trait Problem {
     /// Hands over all residuals at `state`. `None` where the state is impossible (a point behind
     /// the camera): the step that led there is shortened.
     fn residuals(&self, state: &Self::State, out: &mut Residuals) -> Option<()>;
-    /// Parameters that fall into blocks which share no residual: solved block by block, with the same result.
+    /// Blocks of parameters that share no residual; they are solved block by block, with the same result.
     fn blocks(&self) -> Option<Blocks> {
         None
     }
@@ -31,12 +31,12 @@ pub trait Problem {
 pub struct LmOptions {
     /// Applied to each group of residuals.
     pub loss: Loss,
-    /// The residuals' common sigma is unknown: it is estimated (robustly) and the loss's threshold
-    /// follows it. False: residuals are in units of their true sigma.
+    /// True: the residuals' common sigma is unknown; it is estimated robustly, and the loss's threshold follows it.
+    /// False: residuals are in units of their true sigma.
     pub estimate_scale: bool,
-    /// Steps at most, per round; 1..=1000.
+    /// Most steps in each round; 1..=1000.
     pub max_iterations: usize,
-    /// Relative decrease of the cost at which it stops; 1e-16..=1e-4.
+    /// Relative decrease of the cost at which the iteration stops; 1e-16..=1e-4.
     pub tolerance: f64,
     /// Parameters that keep their starting value; their covariance is zero.
     pub hold: Vec<usize>,
@@ -73,19 +73,19 @@ impl LmOptions {
     }
 }
 
-/// Whether what was found is a minimum. The order is from good to bad.
+/// Whether the result is a minimum. The order is from good to bad.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum End {
-    /// The cost falls by no more than the tolerance, or by nothing that its digits show.
+    /// The cost falls by no more than the tolerance, or by less than its digits show.
     Minimum,
-    /// The steps ran out while the cost still fell.
+    /// The limit on steps was reached while the cost still fell.
     Exhausted,
     /// No step is possible, however short: every one leads to an impossible state.
     Stuck,
 }
 
 impl End {
-    /// What people are told of a result that is no minimum.
+    /// Remark for the user on a result that is no minimum.
     pub fn remark(self) -> Option<&'static str> {
         match self {
             End::Minimum => None,
@@ -99,18 +99,18 @@ impl End {
     }
 }
 
-/// How a fit ended. A solution is had only by saying which ends count.
+/// How a fit ended. A caller obtains the solution only by stating which ends it accepts.
 #[derive(Clone, Debug)]
 #[must_use]
 pub enum Outcome<S> {
-    /// A state to go on from, and whether it is a minimum.
+    /// A state, and whether it is a minimum.
     Found(Solution<S>, End),
     /// The start itself is impossible.
     BadStart,
 }
 
 impl<S> Outcome<S> {
-    /// The solution with its end, which belongs into whatever is reported of it.
+    /// The solution with its end, which any report of the solution should state.
     pub fn ended(self) -> Option<(Solution<S>, End)> {
         match self {
             Outcome::Found(solution, end) => Some((solution, end)),
@@ -121,18 +121,18 @@ impl<S> Outcome<S> {
     pub fn minimum(self) -> Option<Solution<S>> {
         self.ended().filter(|(_, end)| *end == End::Minimum).map(|(solution, _)| solution)
     }
-    /// The solution whatever its end: as a start of another fit, or to compare models by.
+    /// The solution whatever its end: to start another fit, or to compare models.
     pub fn so_far(self) -> Option<Solution<S>> {
         self.ended().map(|(solution, _)| solution)
     }
 }
 
-/// What [`lm`] found.
+/// Result of [`lm`].
 #[derive(Clone, Debug)]
 pub struct Solution<S> {
-    /// Where it ended.
+    /// The final state.
     pub state: S,
-    /// Steps taken, all rounds together.
+    /// Number of steps, all rounds together.
     pub iterations: usize,
     /// Root mean square of all measured residuals, unweighted, in the residuals' unit.
     pub rms: f64,
@@ -155,7 +155,7 @@ pub struct Solution<S> {
 }
 
 impl<S> Solution<S> {
-    /// Covariance with the residuals' sigma taken from the residuals themselves.
+    /// Covariance scaled by the residuals' own sigma, estimated from the residuals.
     pub fn scaled_covariance(&self) -> Option<DMatrix<f64>> {
         self.covariance.as_ref().map(|c| c * (self.sigma0 * self.sigma0))
     }
@@ -164,7 +164,7 @@ impl<S> Solution<S> {
 /// Levenberg-Marquardt with Marquardt's scaling and Nielsen's damping [madsen04, alg. 3.16];
 /// robust losses by iterated weights.
 pub fn lm<P: Problem>(problem: &P, start: P::State, options: &LmOptions) -> Outcome<P::State> {
-    // An unknown scale and the robust weights depend on each other: a few rounds settle it.
+    // An unknown scale and the robust weights depend on each other: a few rounds make both converge.
     let rounds = if options.estimate_scale && options.loss != Loss::Squares { 4 } else { 1 };
     let (mut state, mut iterations, mut end) = (start, 0, End::Minimum);
     let mut scale = if rounds > 1 { scale_at(problem, &state) } else { 1.0 };
@@ -192,7 +192,7 @@ fn scale_at<P: Problem>(problem: &P, state: &P::State) -> f64 {
     robust_scale(&mut lengths, size).max(1e-12)
 }
 
-/// Where it ends, the steps taken and whether that is a minimum; `None` where the start is impossible.
+/// The final state, the number of steps and how it ended; `None` where the start is impossible.
 fn minimise<P: Problem>(problem: &P, start: P::State, o: &LmOptions, scale: f64) -> Option<(P::State, usize, End)> {
     let n = problem.width();
     let order = Order::new(n, &o.hold, problem.blocks());
@@ -223,11 +223,11 @@ fn minimise<P: Problem>(problem: &P, start: P::State, o: &LmOptions, scale: f64)
             possible |= tried.is_some();
             match tried {
                 Some(t) if t.1 >= 0.0 => break t,
-                // Nothing better within the digits of the cost: this is the bottom.
+                // No improvement within the digits of the cost: this is the minimum.
                 Some((_, _, predicted)) if predicted.abs() <= 1e-15 * here.cost => {
                     return Some((state, iteration, End::Minimum));
                 }
-                // The shortest steps that the digits show gain nothing, or are all impossible.
+                // Even the shortest steps that the digits resolve gain nothing, or all are impossible.
                 _ if damping > 1e15 => {
                     return Some((state, iteration, if possible { End::Minimum } else { End::Stuck }));
                 }
@@ -268,8 +268,8 @@ fn finish<P: Problem>(
     let all: f64 = r.groups.iter().map(|g| g.size as f64).sum();
     let rms = (measured(&|g| g.length * g.length) / count.max(1.0)).sqrt();
     let freedom = (all - order.free().len() as f64).max(0.0);
-    // Huber's covariance of an M-estimate with the correction for the weights' mean, so that
-    // measurements that were set aside carry no information: docs/math.md, Least squares (5).
+    // Huber's covariance of an M-estimate, corrected for the mean of the weights, so that rejected measurements carry
+    // no information: docs/math.md, Least squares (5).
     let p = r.psi;
     let measured_freedom = (p.residuals * freedom / all.max(1.0)).max(1e-300);
     let (mean_slope, mean_weight) = (p.slope / p.residuals.max(1.0), p.weight / p.residuals.max(1.0));
@@ -323,7 +323,7 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_distr::{Distribution, Normal};
 
-    /// y = a exp(b x) + c, some of the data wrong.
+    /// y = a exp(b x) + c; some of the data are wrong.
     struct Decay {
         data: Vec<(f64, f64)>,
     }
@@ -408,7 +408,7 @@ mod tests {
         assert!(outcome.clone().minimum().is_none() && outcome.so_far().is_some());
     }
 
-    /// Its cost falls to the right, and the right is impossible from `wall` on.
+    /// Its cost falls to the right; states beyond `wall` are impossible.
     struct Walled {
         wall: f64,
     }

@@ -1,7 +1,7 @@
 //! In: squared residuals of groups. Out: robust costs and weights, and a robust scale.
 //! Frame and unit: none; residuals are in units of their sigma (docs/math.md, Least squares (3)).
 
-/// How a group of residuals with squared length s counts. Thresholds are in sigmas.
+/// How a group of residuals with squared length s is weighted. Thresholds are in sigmas.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Loss {
     /// Plain least squares.

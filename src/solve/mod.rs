@@ -2,9 +2,9 @@
 //! robust weights, seeded consensus (RANSAC).
 //! Frame and unit: none; the caller's. Residuals are best given in units of their own sigma.
 //!
-//! Why not the crate `levenberg-marquardt`: it wants one dense Jacobian and factors it by QR, 2 n² (m - n/3) = 150
-//! Mflop a step for a camera of 26 pictures (m = 2808, n = 166), where the few columns that each corner touches make
-//! 2 Mflop with the Cholesky factor; and it knows no states on manifolds, robust losses, held parameters or
+//! Why not the crate `levenberg-marquardt`: it needs one dense Jacobian and factors it by QR. That takes 2 n² (m - n/3)
+//! = 150 Mflop a step for a camera of 26 pictures (m = 2808, n = 166). Each corner touches only a few columns, so the
+//! Cholesky factor takes 2 Mflop. The crate also has no states on manifolds, robust losses, held parameters or
 //! covariance, which every calibration here needs.
 
 mod consensus;

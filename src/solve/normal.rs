@@ -4,13 +4,13 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Parameters from `first` on come in blocks of `size`, no residual touching two of them: the boards' poses of a
-/// camera calibration, each seen in one picture.
+/// Parameters from `first` on form blocks of `size`, and no residual touches two blocks. An example: the boards' poses
+/// of a camera calibration, each seen in one picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Blocks {
-    /// Index of the first parameter that is in a block; those before it are shared.
+    /// Index of the first parameter in a block; those before it are shared.
     pub first: usize,
-    /// Parameters a block.
+    /// Number of parameters in a block.
     pub size: usize,
 }
 
@@ -34,7 +34,7 @@ impl Order {
     pub fn free(&self) -> Vec<usize> {
         self.shared.iter().chain(self.blocks.iter().flatten()).copied().collect()
     }
-    /// The parameters that have an element with one of `block`'s: their place in the equations.
+    /// The parameters that have a matrix element with a parameter of `block`.
     fn touching<'a>(&'a self, block: &'a [usize]) -> impl Iterator<Item = usize> + 'a {
         self.shared.iter().chain(block).copied()
     }
@@ -43,15 +43,15 @@ impl Order {
 /// The factorised equations.
 pub(super) struct Factor<'a> {
     order: &'a Order,
-    /// Of the shared parameters, the blocks eliminated (their Schur complement).
+    /// Factor for the shared parameters after elimination of the blocks (their Schur complement).
     shared: Cholesky<f64, Dyn>,
     own: Vec<Cholesky<f64, Dyn>>,
-    /// Of each block: how it follows the shared parameters, D⁻¹E.
+    /// For each block, how it follows the shared parameters, D⁻¹E.
     follow: Vec<DMatrix<f64>>,
 }
 
 impl<'a> Factor<'a> {
-    /// `at` gives an element of the lower triangle: row, column. `None` where it is not positive definite.
+    /// `at` gives an element of the lower triangle: row, column. `None` where the matrix is not positive definite.
     pub fn new(order: &'a Order, at: impl Fn(usize, usize) -> f64) -> Option<Factor<'a>> {
         let at = |i: usize, j: usize| if i >= j { at(i, j) } else { at(j, i) };
         let part = |rows: &[usize], columns: &[usize]| {
@@ -71,7 +71,7 @@ impl<'a> Factor<'a> {
         Some(Factor { order, shared, own, follow })
     }
 
-    /// x of A x = b; zero for held parameters.
+    /// The solution x of A x = b; zero for held parameters.
     pub fn solve(&self, b: &DVector<f64>) -> Vec<f64> {
         let of = |indices: &[usize]| DVector::from_iterator(indices.len(), indices.iter().map(|&i| b[i]));
         let mut right = of(&self.order.shared);
@@ -130,7 +130,8 @@ pub(super) fn inverse(order: &Order, lower: &DMatrix<f64>) -> (Option<DMatrix<f6
     free.iter().for_each(|&i| d[i] = 1.0 / lower[(i, i)].sqrt());
     let scaled = |i: usize, j: usize| lower[(i, j)] * d[i] * d[j];
     let Some(mut inverse) = Factor::new(order, scaled).map(|f| f.inverse()) else { return (None, 0.0) };
-    // The 1-norm of what was scaled: a block's rows end with the shared ones.
+    // The 1-norm of the scaled matrix. A block's parameters have elements only with each other and with the shared
+    // ones.
     let both = |i: usize, j: usize| if i >= j { scaled(i, j) } else { scaled(j, i) };
     let column = |j: usize| -> f64 {
         match order.blocks.iter().find(|b| b.contains(&j)) {
@@ -157,7 +158,7 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
 
-    /// Three shared parameters and four blocks of two, two parameters held: as if all were dense.
+    /// Three shared parameters and four blocks of two, two parameters held: the result equals that of dense equations.
     #[test]
     fn blocks_give_what_dense_equations_give() {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(8);

@@ -1,25 +1,26 @@
-//! Finds numbers that so many measurements share that they may stand for "not measured": 0, -9999, 999.999.
+//! Finds numbers that too many measurements share to be measured values, so that they may stand for "not measured": 0,
+//! -9999, 999.999.
 
 use rayon::slice::ParallelSliceMut;
 
-/// Fewer equal numbers happen by chance.
+/// Fewer equal numbers can occur by chance.
 const LEAST: usize = 8;
-/// A file stands in for missing measurements with at most so many numbers.
+/// A file uses at most this many numbers for missing measurements.
 const AT_MOST: usize = 3;
-/// So many times as often as those that come after these, a number is no measurement among others.
+/// How many times as often as the next most frequent number a number must occur to be suspect.
 const OFTEN: usize = 8;
-/// Least share of all numbers, for one that lies among the others.
+/// Least share of all numbers, for a suspect number that lies among the others.
 const SHARE: f64 = 0.002;
-/// Alone on one side of all others, so many times as far away as they reach.
+/// How many times as far away as the others reach a lone number on one side of them must lie to be suspect.
 const APART: f64 = 3.0;
 
-/// Numbers that may stand for a missing one, with how many there are of each, the most first. A flat surface that was
-/// computed, not measured, looks the same; so this is a reason to ask, not to drop.
+/// Numbers that may stand for a missing one, with their counts, the most frequent first. A flat surface that was
+/// computed, not measured, looks the same: the result is a reason to ask, not to drop data.
 pub fn repeated(values: impl Iterator<Item = f64>) -> Vec<(f64, usize)> {
     let mut sorted: Vec<f64> = values.filter(|v| v.is_finite()).collect();
     sorted.par_sort_unstable_by(f64::total_cmp);
     let mut runs: Vec<(f64, usize)> = sorted.chunk_by(|a, b| a == b).map(|run| (run[0], run.len())).collect();
-    // An end that lies alone: [how far from the next, how far the others reach].
+    // An end is alone if its gap to the next number exceeds `APART` times the range of the others.
     let (n, all) = (runs.len(), sorted.len());
     let alone = |end: usize, next: usize, other: usize| {
         let (gap, rest) = ((runs[end].0 - runs[next].0).abs(), (runs[next].0 - runs[other].0).abs());
@@ -54,7 +55,7 @@ mod tests {
             let values: Vec<f64> = (0..1200).map(|i| if i < count { stand_in } else { noise(5.0, 0.5) }).collect();
             assert_eq!(repeated(values.into_iter()), [(stand_in, count)], "{count} of {stand_in}");
         }
-        // Two at once; steps of a coarse sensor with a missing level far from them.
+        // Two stand-ins at once; steps of a coarse sensor with a missing level far from them.
         let two = (0..1000).map(|i| [0.0, -9999.0, noise(300.0, 10.0)][(i % 10).min(2)]).collect::<Vec<_>>();
         assert_eq!(repeated(two.into_iter()), [(-9999.0, 100), (0.0, 100)]);
         let near = (0..1000).map(|i| [0.0, 1.0, noise(1.0, 3.0)][(i % 10).min(2)]).collect::<Vec<_>>();

@@ -5,8 +5,8 @@
 use super::Loss;
 use nalgebra::{DMatrix, DVector};
 
-/// Collects residuals. A problem calls [`Residuals::group`] for every measurement and
-/// [`Residuals::prior`] for knowledge that is not to be doubted.
+/// Collects residuals. A problem calls [`Residuals::group`] for every measurement, and [`Residuals::prior`] for prior
+/// knowledge, which the robust loss does not reduce.
 pub struct Residuals {
     loss: Loss,
     scale: f64,
@@ -31,7 +31,7 @@ pub(super) struct Group {
     pub prior: bool,
 }
 
-/// Sums behind the covariance of an M-estimate: psi = w r.
+/// Sums for the covariance of an M-estimate: psi = w r.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Psi {
     pub residuals: f64,
@@ -58,7 +58,7 @@ impl Residuals {
         }
     }
 
-    /// False while only the cost is needed: the Jacobians given then are not read and may be empty.
+    /// False while only the cost is needed: Jacobians are then not read and may be empty.
     pub fn wants_jacobian(&self) -> bool {
         self.wants_jacobian
     }
@@ -69,7 +69,7 @@ impl Residuals {
         self.add(residual, columns, jacobian, self.loss, self.scale, false);
     }
 
-    /// As [`Residuals::group`], but always quadratic and in absolute sigmas.
+    /// Like [`Residuals::group`], but always quadratic and in absolute sigmas.
     pub fn prior(&mut self, residual: &[f64], columns: &[usize], jacobian: &[f64]) {
         self.add(residual, columns, jacobian, Loss::Squares, 1.0, true);
     }
@@ -109,7 +109,7 @@ impl Residuals {
         }
     }
 
-    /// Puts the last groups' sums into the equations: before they are read.
+    /// Adds the sums of the last groups to the equations; it must run before the equations are read.
     pub(super) fn settle(&mut self) {
         let k = self.columns.len();
         for (a, &ca) in self.columns.iter().enumerate() {

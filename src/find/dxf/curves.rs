@@ -1,5 +1,5 @@
-//! In: the entities of a DXF file. Out: its curves as polylines and circles, blocks inserted, in one plane seen from
-//! above.
+//! In: the entities of a DXF file. Out: its curves as polylines and circles, with inserted blocks expanded, in one
+//! plane seen from above.
 //! Frame and unit: the drawing's own x y z and its own unit; angles in degrees in the file.
 
 use super::entity::{ellipse, heavy, level, light, mirrored, point, size, turn, wide};
@@ -23,22 +23,22 @@ pub enum Form {
     Path { points: Vec<[f64; 2]>, closed: bool },
 }
 
-/// What was read, and what was passed over.
+/// The curves that were read, and counts of what was skipped or is doubtful.
 #[derive(Debug, Default)]
 pub struct Curves {
     pub curves: Vec<Curve>,
-    /// Annotation and hidden entities, by what they are and why.
+    /// Skipped entities, such as annotation and hidden ones, counted by kind and reason.
     pub passed_over: BTreeMap<String, usize>,
-    /// Edges whose linetype is not continuous, by linetype: centre lines and hidden edges are drawn so.
+    /// Edges whose linetype is not continuous, counted by linetype. Centre lines and hidden edges are drawn this way.
     pub broken: BTreeMap<String, usize>,
-    /// Polylines with a width: what is read is their middle line.
+    /// Number of polylines with a width: their middle line is read.
     pub wide: usize,
 }
 
-/// Limits against a file that inserts blocks in blocks in blocks.
+/// Limits against a file that nests blocks in blocks many times.
 const MOST_POINTS: usize = 400_000;
 const DEEPEST: usize = 16;
-/// Entities that say something about edges but are none.
+/// Entities that annotate edges but are not edges themselves.
 const ANNOTATION: &[&str] = &[
     "TEXT",
     "MTEXT",
@@ -63,14 +63,14 @@ const ANNOTATION: &[&str] = &[
     "PDFUNDERLAY",
 ];
 
-/// A similarity or a stretch of the plane, and a shift along z.
+/// Where a block is placed: an affine map of the plane, and a scale and shift along z.
 #[derive(Clone, Copy)]
 struct Placed {
     x: [f64; 2],
     y: [f64; 2],
     origin: [f64; 2],
     z: f64,
-    /// Scale along z, negative where it is seen from below.
+    /// Scale along z, negative where the block is seen from below.
     rise: f64,
 }
 
@@ -85,19 +85,19 @@ impl Placed {
         self.z + self.rise * z
     }
 
-    /// First `inner`, then this one.
+    /// The composition: `inner` is applied first, then `self`.
     fn after(&self, inner: &Placed) -> Placed {
         let turn = |v: [f64; 2]| std::array::from_fn(|k| self.x[k] * v[0] + self.y[k] * v[1]);
         let (z, rise) = (self.height(inner.z), self.rise * inner.rise);
         Placed { x: turn(inner.x), y: turn(inner.y), origin: self.point(inner.origin), z, rise }
     }
 
-    /// The most that a length grows.
+    /// The larger of the scales along the two axes.
     fn growth(&self) -> f64 {
         (self.x[0].hypot(self.x[1])).max(self.y[0].hypot(self.y[1]))
     }
 
-    /// The scale where circles stay circles.
+    /// The scale if circles stay circles; `None` otherwise.
     fn scale(&self) -> Option<f64> {
         let (a, b) = (self.x[0].hypot(self.x[1]), self.y[0].hypot(self.y[1]));
         let square = (self.x[0] * self.y[0] + self.x[1] * self.y[1]).abs();
@@ -105,7 +105,8 @@ impl Placed {
     }
 }
 
-/// The curves of all layers, or of the named ones; polylines stay within `flat` of what they stand for.
+/// The curves of all layers, or of the named ones; each polyline lies within `flat` of the curve it approximates.
+/// Refuses a named layer that holds nothing, and edges that cannot be read.
 pub fn curves(file: &File, layers: &[String], flat: f64) -> Result<Curves> {
     let wanted = layers.iter().map(|l| key(l)).collect();
     let out = Curves::default();
@@ -129,12 +130,12 @@ pub fn curves(file: &File, layers: &[String], flat: f64) -> Result<Curves> {
 
 struct Reader<'a> {
     file: &'a File,
-    /// Keys of the layers that a person named; empty: all that are shown.
+    /// Keys of the layers that the user named; empty: all visible layers.
     wanted: BTreeSet<String>,
     /// How far a polyline may lie from its curve, in the drawing's unit.
     flat: f64,
     out: Curves,
-    /// Every layer that something lies on, as the file writes it, by its key.
+    /// Every layer that holds an entity, spelled as in the file, by its key.
     layers: BTreeMap<String, String>,
     unread: BTreeMap<String, (usize, usize)>,
     points: usize,
@@ -145,15 +146,15 @@ impl Reader<'_> {
         let mut i = 0;
         while let Some(e) = list.get(i) {
             i += 1;
-            // The vertices of an old polyline follow it.
+            // The vertices of an old-style POLYLINE follow it.
             let vertices = list[i..].iter().take_while(|v| e.kind == "POLYLINE" && v.kind == "VERTEX").count();
             let vertices = &list[i..i + vertices];
             i += vertices.len();
-            // Ends a list of vertices or of a block's texts.
+            // SEQEND ends a list of vertices or of a block's texts.
             if e.kind == "SEQEND" {
                 continue;
             }
-            // What lies on layer 0 of a block lies on the layer of its insertion.
+            // An entity on layer 0 of a block takes the layer of the block's insertion.
             let layer = if e.layer() == "0" { parent } else { e.layer() };
             self.layers.entry(key(layer)).or_insert_with(|| layer.to_owned());
             if let Some(why) = self.passed(e, layer)? {
@@ -167,12 +168,12 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Why an entity is no edge of the part, in words.
+    /// Why an entity is skipped, in words; `None` if it is read.
     fn passed(&self, e: &Entity, layer: &str) -> Result<Option<String>> {
         let named = self.wanted.contains(&key(layer));
         let table = self.file.layers.get(&key(layer));
         let (off, frozen) = table.map_or((false, false), |l| (l.off, l.frozen));
-        // What a block holds on other layers is seen even where its insertion's layer is off, but not where that is
+        // A block's entities on other layers stay visible where the insertion's layer is off, but not where it is
         // frozen.
         let block = e.kind == "INSERT";
         let why = if ANNOTATION.contains(&e.kind.as_str()) {
@@ -200,7 +201,7 @@ impl Reader<'_> {
     fn insert(&mut self, e: &Entity, placed: &Placed, layer: &str, open: &mut BTreeSet<String>) -> Result<()> {
         let name = e.text(2).unwrap_or_default().to_owned();
         let block = self.file.blocks.get(&key(&name));
-        // Flags 4 and 8: the block's content is in another file.
+        // Bits 4 and 8: the block's content is in another file.
         let Some(block) = block.filter(|b| b.head.whole(70, 0).is_ok_and(|flags| flags & 12 == 0)) else {
             let what = if block.is_some() { "which is in another file" } else { "which is not a block" };
             return Err(e.fault(format!("it inserts '{name}', {what}")).next("bind external references"));
@@ -238,7 +239,7 @@ impl Reader<'_> {
     fn curve(&mut self, e: &Entity, vertices: &[Entity], placed: &Placed, layer: &str) -> Result<()> {
         use std::f64::consts::TAU;
         let flat = self.flat / placed.growth();
-        // These are given in the drawing's own axes; a normal of theirs says only along what they are extruded.
+        // These are given in the drawing's own axes; their normal states only the direction of extrusion.
         let flags = e.whole(70, 0)?;
         let own = ["LINE", "ELLIPSE", "SPLINE"].contains(&e.kind.as_str()) || (e.kind == "POLYLINE" && flags & 8 != 0);
         let mirror = if own { 1.0 } else { mirrored(e)? };
@@ -289,7 +290,7 @@ impl Reader<'_> {
         self.add(layer, placed.height(mirror * z), form)
     }
 
-    /// Counts an edge that is drawn broken.
+    /// Counts an edge whose linetype is not continuous.
     fn count_broken(&mut self, e: &Entity, layer: &str) {
         let table = self.file.layers.get(&key(layer)).map(|l| l.linetype.as_str());
         let linetype = e.text(6).filter(|t| key(t) != "BYLAYER").or(table).unwrap_or_default();
@@ -298,7 +299,7 @@ impl Reader<'_> {
         }
     }
 
-    /// An edge that is not read: the drawing will be refused, with all such edges named.
+    /// Records an edge that cannot be read: the drawing will be refused, and the error names all such edges.
     fn skip(&mut self, kind: &str, e: &Entity) -> Result<()> {
         self.unread.entry(kind.to_owned()).or_insert((0, e.line)).0 += 1;
         Ok(())

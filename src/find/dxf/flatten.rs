@@ -1,12 +1,13 @@
-//! In: arcs and polylines with bulges. Out: points on them, so many that the polyline stays within a given distance.
+//! In: arcs and polylines with bulges. Out: points on them, dense enough that the polyline stays within a given
+//! distance.
 //! Frame and unit: the drawing's own x y and unit; angles in radians.
 
-/// Most turn between two points, rad: a small arc keeps its direction, whatever distance is allowed.
+/// Largest angle between two points, rad: even a small arc keeps its direction, whatever distance is allowed.
 const STEP: f64 = std::f64::consts::TAU / 100.0;
 
-/// From one angle to another, both ends included.
+/// Points on an arc from one angle to another, both ends included; the polyline stays within `flat` of the arc.
 pub fn arc(centre: [f64; 2], radius: f64, from: f64, to: f64, flat: f64) -> Vec<[f64; 2]> {
-    // A chord over an angle a lies r a^2 / 8 below its arc. No arc of a part needs more points than the limit.
+    // A chord over an angle a lies up to r a^2 / 8 from its arc. The lower limit suffices for every arc of a part.
     let step = STEP.min((8.0 * flat / radius).sqrt()).max(STEP / 100.0);
     let steps = ((to - from).abs() / step).ceil().max(2.0) as usize;
     (0..=steps)
@@ -17,7 +18,8 @@ pub fn arc(centre: [f64; 2], radius: f64, from: f64, to: f64, flat: f64) -> Vec<
         .collect()
 }
 
-/// A polyline whose pieces may be arcs: the bulge is the tangent of a quarter of the arc's angle, positive to the left.
+/// Points on a polyline whose segments may be arcs. The bulge is the tangent of a quarter of the arc's angle, positive
+/// where the arc turns left.
 pub fn bent(corners: &[([f64; 2], f64)], closed: bool, flat: f64) -> Vec<[f64; 2]> {
     let mut out = Vec::new();
     for (i, &(a, bulge)) in corners.iter().enumerate() {
@@ -38,5 +40,5 @@ pub fn bent(corners: &[([f64; 2], f64)], closed: bool, flat: f64) -> Vec<[f64; 2
     out
 }
 
-/// How far a polyline may lie from the curve it stands for, mm: well below what a scan can tell.
+/// How far a polyline may lie from the curve it approximates, mm: well below what a scan can resolve.
 pub const FLAT: f64 = 0.002;

@@ -1,4 +1,4 @@
-//! In: curves of a drawing. Out: closed loops, joined end to end, and what could not be joined.
+//! In: curves of a drawing. Out: closed loops, joined end to end, and the chains that could not be closed.
 //! Frame and unit: the drawing's x y z, mm.
 
 use super::curves::{Curve, Form};
@@ -19,17 +19,17 @@ pub struct Loop {
 #[derive(Debug, Default)]
 pub struct Joined {
     pub loops: Vec<Loop>,
-    /// Chains with two free ends.
+    /// Chains that close no loop, and loops without area.
     pub open: Vec<Curve>,
-    /// Places at which more than two edges end: no chain runs through them.
+    /// Number of places at which more than two edges end: no chain runs through them.
     pub forks: usize,
     pub duplicates: usize,
 }
 
-/// Ends nearer than this are one place, mm.
+/// Ends closer together than this are one place, mm.
 pub const JOIN: f64 = 0.01;
 
-/// Nodes of ends that lie together, found through the cells of a grid.
+/// Nodes, each shared by the ends that lie together; they are found through the cells of a grid.
 #[derive(Default)]
 struct Nodes {
     cells: HashMap<[i64; 3], Vec<usize>>,
@@ -41,7 +41,7 @@ impl Nodes {
         let q = [p[0], p[1], z];
         let cell = q.map(|v| (v / JOIN).floor() as i64);
         for k in 0..27 {
-            // A damaged drawing's place can lie beyond all cells: in the last one then.
+            // A damaged drawing's coordinates can exceed all cell indices: they saturate at the last cell.
             let step = [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1];
             let near = [0, 1, 2].map(|i| cell[i].saturating_add(step[i]));
             let known = self.cells.get(&near).into_iter().flatten().copied();
@@ -74,7 +74,7 @@ pub fn join(curves: &[Curve]) -> Joined {
         if used[start] {
             continue;
         }
-        // Back to a free end or a fork, or once around.
+        // Walk back to a free end or a fork, or once around.
         let (mut piece, mut end) = (start, 0);
         while let Some(next) = through(pieces[piece].ends[end], piece).filter(|&n| n != start) {
             end = usize::from(pieces[next].ends[0] == pieces[piece].ends[end]);
@@ -109,13 +109,13 @@ pub fn join(curves: &[Curve]) -> Joined {
 
 /// An edge between two places.
 struct Piece<'a> {
-    /// Nodes.
+    /// Nodes at its two ends.
     ends: [usize; 2],
     curve: &'a Curve,
     points: &'a [[f64; 2]],
 }
 
-/// What is to be joined; edges that are closed by themselves, and those drawn twice, go to `out`.
+/// The open edges that are to be joined. Closed edges, and the count of edges drawn twice, go to `out`.
 fn pieces<'a>(curves: &'a [Curve], out: &mut Joined) -> Vec<Piece<'a>> {
     let mut nodes = Nodes::default();
     let mut seen = HashSet::new();
@@ -152,7 +152,8 @@ fn pieces<'a>(curves: &'a [Curve], out: &mut Joined) -> Vec<Piece<'a>> {
     pieces
 }
 
-/// A closed loop without repeated points. One without area (a line there and back, a bow tie) is an edge all the same.
+/// Adds a closed loop without repeated points. One without area (a line drawn there and back, a bow tie) is still an
+/// edge: it goes to `open`.
 fn push(out: &mut Joined, c: &Curve, mut points: Vec<[f64; 2]>) {
     let apart = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) > 1e-6;
     points.dedup_by(|a, b| !apart(a, b));
@@ -168,7 +169,7 @@ fn push(out: &mut Joined, c: &Curve, mut points: Vec<[f64; 2]>) {
     }
 }
 
-/// Centre and radius where arcs, bulges or a spline draw a whole circle.
+/// Centre and radius where arcs, bulges or a spline draw a full circle.
 fn circle(points: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
     let n = points.len();
     if n < 32 {
@@ -181,7 +182,8 @@ fn circle(points: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
     let centre = [a[0] + (v[1] * uu - u[1] * vv) / twice, a[1] + (u[0] * vv - v[0] * uu) / twice];
     let off = |p: [f64; 2]| (p[0] - centre[0]).hypot(p[1] - centre[1]);
     let radius = off(a);
-    // The corners lie on it, and the chords as close to it as those of a flattened arc, which a polygon's sides do not.
+    // The corners lie on the circle, and the chords are as close to it as those of a flattened arc. The sides of a
+    // polygon are not.
     let near = |i: usize| {
         let (p, q) = (points[i], points[(i + 1) % n]);
         let middle = [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];

@@ -25,7 +25,7 @@ pub struct Unit {
     pub name: &'static str,
     /// Its length, mm.
     pub mm: f64,
-    /// Its number in $INSUNITS.
+    /// Its code in $INSUNITS.
     code: i64,
 }
 
@@ -47,17 +47,18 @@ impl std::str::FromStr for Unit {
     }
 }
 
-/// More is no drawing of a part but an assembly, bytes.
+/// Largest file that is read, bytes: a larger one is an assembly, not the drawing of a part.
 pub const LARGEST: u64 = 64 << 20;
 
-/// What a person says about a drawing.
+/// What the user states about a drawing.
 #[derive(Clone, Debug, Default)]
 pub struct DxfOptions {
-    /// Needed where the file names no unit, and obeyed where it names another: headers are often wrong.
+    /// Required where the file names no unit. It overrides the file's unit: headers are often wrong.
     pub unit: Option<Unit>,
-    /// Layers that hold the part's edges, switched off or not. Default all that are shown.
+    /// Layers that hold the part's edges, whether switched off or not. Default: all visible layers.
     pub layers: Vec<String>,
-    /// The part frame's origin in the drawing, in the drawing's unit. Default the middle of the largest outline's box.
+    /// The part frame's origin in the drawing, in the drawing's unit. Default: the centre of the largest outline's
+    /// bounding box.
     pub origin: Option<[f64; 2]>,
 }
 
@@ -70,13 +71,13 @@ pub struct Imported {
     pub unit: &'static str,
     /// The part frame's origin in the drawing, in the drawing's unit.
     pub origin: [f64; 2],
-    /// What was passed over, in words.
+    /// What was skipped or counted once, in words.
     pub notes: Vec<String>,
     /// What may be a mistake of the drawing, in words.
     pub warnings: Vec<String>,
 }
 
-/// Reads a drawing.
+/// Reads a drawing. Refuses a file that is damaged, names no usable unit or has no closed outline.
 pub fn read(bytes: &[u8], options: &DxfOptions) -> Result<Imported> {
     let file = tags::read(bytes)?;
     let (unit, doubt) = unit(&file, options.unit)?;
@@ -130,7 +131,7 @@ pub fn read(bytes: &[u8], options: &DxfOptions) -> Result<Imported> {
     Ok(Imported { drawing, unit: unit.name, origin, notes, warnings })
 }
 
-/// The drawing's unit, and why it may be another one.
+/// The drawing's unit, and the reason to doubt it.
 fn unit(file: &tags::File, wanted: Option<Unit>) -> Result<(Unit, Option<String>)> {
     let named = file.units.filter(|&code| code != 0);
     let known = named.map(|code| (code, UNITS.iter().copied().find(|u| u.code == code)));
@@ -154,7 +155,8 @@ fn unit(file: &tags::File, wanted: Option<Unit>) -> Result<(Unit, Option<String>
     }
 }
 
-/// $MEASUREMENT 1 is metric. The opposite, 0 beside millimetres, is what templates leave in right drawings.
+/// A warning where an imperial unit meets $MEASUREMENT 1, which is metric. The opposite, 0 with millimetres, is no sign
+/// of a mistake: templates leave it in correct drawings.
 fn contradicted(unit: Unit, measurement: Option<i64>) -> Option<String> {
     let imperial = ["inch", "mil", "foot"].contains(&unit.name);
     (imperial && measurement == Some(1)).then(|| {

@@ -1,17 +1,18 @@
-//! In: closed loops and open chains of a drawing. Out: shapes: outlines are material, what lies in them is a hole,
-//! and so on inwards. Frame and unit: part frame; mm.
+//! In: closed loops and open chains of a drawing. Out: shapes: an outline bounds material, a loop inside it a hole, and
+//! so on inwards.
+//! Frame and unit: part frame; mm.
 
 use super::curves::{Curve, Form as Drawn};
 use super::loops::Loop;
 use crate::find::model::outline::{area, bounds, contains};
 use crate::find::model::shape::{Form, Grid, Inside, Shape};
 
-/// Lengths are rounded to a micrometre, so that a drawing in inches stays readable.
+/// Rounds a length to a micrometre, so that a drawing in inches stays readable.
 fn micrometre(v: f64) -> f64 {
     (v * 1000.0).round() / 1000.0 + 0.0
 }
 
-/// The smallest larger loop around each, on the same surface; loops come by size, the largest first.
+/// For each loop, the smallest larger loop around it at the same height. Loops are sorted by size, the largest first.
 fn parents(loops: &[Loop]) -> Vec<Option<usize>> {
     let boxes: Vec<[f64; 4]> = loops.iter().map(|l| bounds(&l.points)).collect();
     (0..loops.len())
@@ -26,7 +27,7 @@ fn parents(loops: &[Loop]) -> Vec<Option<usize>> {
         .collect()
 }
 
-/// Material that stands in a hole belongs to the hole's outline: a slit without width leads to it.
+/// Joins each island, which is material inside a hole, to the hole's outline through a slit without width.
 fn bridge_islands(loops: &mut [Loop], parents: &[Option<usize>], depth: &[usize]) {
     let mut islands: Vec<usize> = (0..loops.len()).filter(|&i| depth[i] >= 2 && depth[i].is_multiple_of(2)).collect();
     islands.sort_by_key(|&i| depth[i]);
@@ -62,7 +63,7 @@ pub fn shapes(mut loops: Vec<Loop>, open: &[Curve]) -> Vec<Shape> {
             Some((centre, radius)) => circles.push((l, inside, centre, radius)),
             None => out.push(straight(l, inside, l.z - datum)),
         }
-        // The first shape stays the first.
+        // The largest outline's shape stays the first.
         if out.is_empty() {
             let (l, inside, centre, radius) = circles.pop().expect("the first loop is one or the other");
             out.push(round(l, inside, l.z - datum, centre, radius, None));
@@ -80,10 +81,10 @@ pub fn shapes(mut loops: Vec<Loop>, open: &[Curve]) -> Vec<Shape> {
     out
 }
 
-/// Sides at which a point just inside an outline is looked for: of those without a turn at one of them any will do.
+/// Most sides at which a point just inside an outline is searched: almost every side yields one.
 const TRIED: usize = 64;
 
-/// A point just inside an outline.
+/// A point just inside an outline; its first corner if none is found.
 fn inside_of(p: &[[f64; 2]]) -> [f64; 2] {
     for i in (0..p.len()).step_by(p.len().div_ceil(TRIED).max(1)) {
         let (a, b) = (p[i], p[(i + 1) % p.len()]);
@@ -102,7 +103,7 @@ fn blank(kind: Form, inside: Inside, z: f64) -> Shape {
     Shape { z_mm: micrometre(z), ..Shape::new(kind, inside) }
 }
 
-/// A rectangle where it is one, else a polygon.
+/// A rectangle if the loop is one, otherwise a polygon.
 fn straight(l: &Loop, inside: Inside, z: f64) -> Shape {
     let name = Some(l.layer.clone());
     if let [a, b, c, d] = l.points[..] {
@@ -111,7 +112,7 @@ fn straight(l: &Loop, inside: Inside, z: f64) -> Shape {
         let (lu, lv) = (u[0].hypot(u[1]), v[0].hypot(v[1]));
         let even = (u[0] - w[0]).hypot(u[1] - w[1]) < 1e-4 && (u[0] * v[0] + u[1] * v[1]).abs() < 1e-4 * lu.max(lv);
         if even {
-            // Sizes along the axes where it lies along them.
+            // The angle is kept within 45 deg of zero, so that a rectangle along the axes has its sizes along x and y.
             let turn = u[1].atan2(u[0]).to_degrees().rem_euclid(180.0);
             let (size, turn) = if (45.0 - 1e-9..135.0 - 1e-9).contains(&turn) {
                 ([lv, lu], turn - 90.0)
@@ -133,7 +134,8 @@ fn round(l: &Loop, inside: Inside, z: f64, centre: [f64; 2], radius: f64, grid: 
     Shape { name: Some(l.layer.clone()), centre, radius, grid, ..blank(Form::Circle, inside, z) }
 }
 
-/// Equal circles of a layer that fill a rectangular array are one shape with a grid; the others stand alone.
+/// Equal circles of a layer that fill a rectangular array become one shape with a grid; the others become single
+/// shapes.
 fn grids(out: &mut Vec<Shape>, mut circles: Vec<(&Loop, Inside, [f64; 2], f64)>, datum: f64) {
     while let Some(&(first, inside, _, radius)) = circles.first() {
         let alike = |c: &(&Loop, Inside, [f64; 2], f64)| {
@@ -160,7 +162,7 @@ fn grids(out: &mut Vec<Shape>, mut circles: Vec<(&Loop, Inside, [f64; 2], f64)>,
     }
 }
 
-/// Names from the layers, each once; layer 0 says nothing.
+/// Names the shapes after their layers and numbers repeated names. On layer 0 the name is `part` or `hole`.
 fn named(shapes: &mut [Shape]) {
     let mut count = std::collections::HashMap::<String, usize>::new();
     let bare = |s: &Shape| {

@@ -9,18 +9,18 @@ use crate::fault::Result;
 pub struct Spline {
     degree: usize,
     knots: Vec<f64>,
-    /// x w, y w, w.
+    /// Homogeneous: x w, y w, w.
     control: Vec<[f64; 3]>,
 }
 
-/// Programs write 3, some 5; the limit keeps a damaged number from asking for hours.
+/// Programs write degree 3, some 5; the limit keeps a damaged number from taking hours.
 const HIGHEST_DEGREE: i64 = 25;
-/// Most pieces between two knots.
+/// Most segments between two knots.
 const MOST_PIECES: usize = 1024;
 
 impl Spline {
-    /// `None` where the file gives only points that the curve passes: how it runs between them is the program's own
-    /// affair.
+    /// Reads a spline. `None` where the file gives only points that the curve passes through: its shape between them
+    /// depends on the program that wrote it.
     pub fn of(e: &Entity) -> Result<Option<Spline>> {
         let all = |code: i32| e.tags.iter().filter(|t| t.code == code).map(Tag::number).collect::<Result<Vec<f64>>>();
         let (knots, weights, x, y) = (all(40)?, all(41)?, all(10)?, all(20)?);
@@ -65,7 +65,8 @@ impl Spline {
         [d[p][0] / d[p][2], d[p][1] / d[p][2]]
     }
 
-    /// Points from end to end; the middle of no chord lies farther than `flat` from the curve.
+    /// Points from end to end. The midpoint of each chord lies within `flat` of the curve, up to `MOST_PIECES` segments
+    /// a span.
     pub fn flat(&self, flat: f64) -> Vec<[f64; 2]> {
         let spans = (self.degree..self.control.len()).filter(|&i| self.knots[i + 1] > self.knots[i]);
         let mut out: Vec<[f64; 2]> = Vec::new();

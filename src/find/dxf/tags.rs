@@ -1,6 +1,5 @@
-//! In: the bytes of a DXF file (ASCII). Out: its unit, layers that are off, blocks and entities, each as its group
-//! codes.
-//! Frame and unit: none; values are text as they stand in the file, lines are counted from 1.
+//! In: the bytes of a DXF file (ASCII). Out: its unit, layers, blocks and entities, each entity as its group codes.
+//! Frame and unit: none; values are the file's text, lines are counted from 1.
 
 use crate::fault::{Fault, Result};
 use std::collections::BTreeMap;
@@ -16,7 +15,7 @@ pub struct Tag {
     pub line: usize,
 }
 
-/// An entity: what it is and its groups up to the next one.
+/// An entity: its kind and its groups up to the next entity.
 #[derive(Clone, Debug)]
 pub struct Entity {
     pub kind: String,
@@ -24,7 +23,7 @@ pub struct Entity {
     pub tags: Vec<Tag>,
 }
 
-/// What of a file is used.
+/// The content of a file that is used.
 #[derive(Clone, Debug, Default)]
 pub struct File {
     /// $INSUNITS; `None` where it is missing.
@@ -36,7 +35,7 @@ pub struct File {
     /// By `key`.
     pub blocks: BTreeMap<String, Block>,
     pub entities: Vec<Entity>,
-    /// Inserted blocks of which the drawing shows a part.
+    /// Number of inserted blocks that the drawing shows only in part.
     pub clipped: usize,
 }
 
@@ -47,12 +46,12 @@ pub struct Layer {
     pub linetype: String,
 }
 
-/// Names of layers, blocks and linetypes are the same in upper and lower case.
+/// Lookup key of a name: names of layers, blocks and linetypes do not depend on case.
 pub fn key(name: &str) -> String {
     name.trim().to_uppercase()
 }
 
-/// Entities that INSERT refers to, about their base point.
+/// Entities that INSERT refers to, relative to their base point.
 #[derive(Clone, Debug)]
 pub struct Block {
     pub head: Entity,
@@ -70,7 +69,7 @@ impl Entity {
         self.tags.iter().find(|t| t.code == code).map(|t| t.value.as_str())
     }
 
-    /// The number of a group, or what stands for a missing one.
+    /// The number of a group; `missing` if there is no such group.
     pub fn number(&self, code: i32, missing: f64) -> Result<f64> {
         self.tags.iter().find(|t| t.code == code).map_or(Ok(missing), Tag::number)
     }
@@ -91,7 +90,7 @@ impl Entity {
 }
 
 impl Tag {
-    /// A length or an angle: finite, and below what a drawing can hold.
+    /// A length or an angle. Refuses a value that is not finite or not below 1e12.
     pub fn number(&self) -> Result<f64> {
         let value = self.value.trim().parse::<f64>().ok().filter(|v| v.is_finite() && v.abs() < 1e12);
         value.ok_or_else(|| {
@@ -115,7 +114,7 @@ impl Tag {
     }
 }
 
-/// Reads a file's groups; what is not needed is passed over unread.
+/// Reads a file's groups; sections that are not needed are skipped.
 pub fn read(bytes: &[u8]) -> Result<File> {
     const NEXT: &str = "save the drawing as ASCII DXF";
     if bytes.starts_with(b"AutoCAD Binary DXF") {
@@ -137,7 +136,7 @@ pub fn read(bytes: &[u8]) -> Result<File> {
                 section(&tags[at..end], &mut file)?;
                 at = end + 1;
             }
-            // Comments and what some programs write between sections.
+            // Comments, and what some programs write between sections.
             _ => {}
         }
     }
@@ -151,9 +150,9 @@ fn cut(tags: &[Tag]) -> Fault {
         .next("export the drawing again as ASCII DXF")
 }
 
-/// UTF-8 since 2007, before that the code page of the writer's Windows. Only names are text here: that they differ
-/// where the file's bytes differ is enough, so each byte is taken for a character, which for the western code page is
-/// the right one.
+/// Text is UTF-8 since 2007, before that in the code page of the writer's Windows. Only names are text here, and they
+/// need only differ where the file's bytes differ. So each byte becomes one character, which is correct for the western
+/// code page.
 fn text(bytes: &[u8]) -> String {
     let plain = match std::str::from_utf8(bytes) {
         Ok(text) => text.to_owned(),
@@ -177,7 +176,7 @@ fn tags(text: &str) -> Result<Vec<Tag>> {
     let mut out = Vec::new();
     let mut lines = text.lines().enumerate();
     while let Some((i, code)) = lines.next() {
-        // Some programs write empty lines, a Ctrl-Z or remains of an older file behind the end.
+        // Some programs write empty lines, a Ctrl-Z or remains of an older file after the end.
         if out.last().is_some_and(|t: &Tag| t.code == 0 && t.value.trim() == "EOF") {
             break;
         }

@@ -19,9 +19,9 @@ use nalgebra::Matrix6;
 pub struct Term {
     /// Source of the uncertainty, e.g. "laser plane".
     pub name: &'static str,
-    /// x, y, z of the part, mm; `None` where the source does not know its uncertainty.
+    /// x, y, z of the part, mm; `None` where the source's uncertainty is unknown.
     pub sigma_mm: Option<[f64; 3]>,
-    /// Turns about x, y, z of the part, degrees; `None` where the source does not know its uncertainty.
+    /// Turns about x, y, z of the part, degrees; `None` where the source's uncertainty is unknown.
     pub sigma_deg: Option<[f64; 3]>,
     /// Where the number comes from, or why there is none.
     pub note: String,
@@ -30,8 +30,8 @@ pub struct Term {
 /// The budget and its sum over the terms that are known.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Budget {
-    /// One a source; "peak noise" is contained in "match" and not added again, nor are calibrations by themselves
-    /// where there is a line of them together.
+    /// One term a source. "peak noise" is contained in "match" and is not added again. Single calibrations are not
+    /// added where one term states them together.
     pub terms: Vec<Term>,
     /// One standard deviation along x, y, z of the part, mm.
     pub sigma_mm: [f64; 3],
@@ -39,28 +39,28 @@ pub struct Budget {
     pub sigma_deg: [f64; 3],
     /// False where a term is unknown: the sum is then a lower bound.
     pub complete: bool,
-    /// Of the pose, 6 x 6 over x y z rx ry rz along the part's own axes, mm and rad.
+    /// Covariance of the pose, 6 x 6 over x y z rx ry rz along the part's own axes, mm and rad.
     #[serde(skip)]
     pub covariance: Matrix6<f64>,
-    /// What belongs to this look alone: match and robot, the part's axes.
+    /// The share of the covariance that this scan alone contributes: match and robot; along the part's axes.
     #[serde(skip)]
     pub own: Matrix6<f64>,
-    /// What all looks of this rig share; none where the scan does not fit the rig.
+    /// Errors that all scans of this rig share; empty where the scan does not fit the rig.
     #[serde(skip)]
     pub levers: Vec<Lever>,
-    /// Sizes against the drawing, of this look alone.
+    /// Sizes compared with the drawing, from this scan alone.
     #[serde(skip)]
     pub shape: Option<Shape>,
-    /// How the part was seen, and how the camera stood over its middle.
+    /// How the part was seen, and the camera's pose over its middle.
     #[serde(skip)]
     pub seen: Option<PartSeen>,
-    /// The camera over the part's middle, mm; `None` where the scan does not fit the rig.
+    /// The camera's pose over the part's middle, mm; `None` where the scan does not fit the rig.
     #[serde(skip)]
     pub base_from_camera: Option<Rigid<Base, Camera>>,
 }
 
 impl Budget {
-    /// The pose goes where a construction says: it is known no better than the few shapes that went into that.
+    /// Adds the uncertainty of a construction: the pose that it gives is known no better than the few shapes in it.
     pub(in crate::find) fn built(&mut self, b: &Built) {
         let v = b.measured.sigma_mm.powi(2);
         let c = Matrix6::from_diagonal(&nalgebra::Vector6::new(v, v, 0.0, 0.0, 0.0, 0.0));
@@ -70,7 +70,8 @@ impl Budget {
         [self.sigma_mm, self.sigma_deg] = sigmas(&self.covariance);
     }
 
-    /// Of a look of which only its own covariance (base axes, or the part's where it has a turn) is known.
+    /// The budget of a scan of which only its own covariance is known (along the base axes, or the part's where it is
+    /// turned).
     pub(in crate::find) fn of_look(own: Matrix6<f64>) -> Budget {
         let [sigma_mm, sigma_deg] = sigmas(&own);
         Budget {
@@ -145,7 +146,7 @@ pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, recipe: 
     Ok(Budget { terms, sigma_mm, sigma_deg, complete, covariance, own, levers, shape, seen, base_from_camera })
 }
 
-/// The lever of calibrations that were made at once; else why what is stated of that is not used, where anything is.
+/// The lever of calibrations that were made jointly; otherwise the reason why a stated joint result is not used.
 fn at_once(seen: &PartSeen, rig: &Rig) -> (Option<Lever>, Option<String>) {
     match rig.joint() {
         None => (None, None),
@@ -165,7 +166,7 @@ fn term(name: &'static str, c: &Matrix6<f64>, note: String) -> Term {
     Term { name, sigma_mm: Some(mm), sigma_deg: Some(deg), note }
 }
 
-/// What the peaks' own sigmas alone would give; part of the match, shown beside it.
+/// What the peaks' own sigmas alone would give. This is part of the match, and is shown for comparison.
 fn peak_noise(points: &Ordered, measured: &Measured) -> Term {
     let mut s: Vec<f32> = points.sigma.iter().copied().filter(|s| s.is_finite() && *s > 0.0).collect();
     if s.is_empty() {
@@ -182,7 +183,7 @@ fn peak_noise(points: &Ordered, measured: &Measured) -> Term {
     }
 }
 
-/// Turns the two halves of a pose's covariance or motion alike.
+/// The matrix that turns both halves of a pose's covariance or motion by the same rotation.
 pub(in crate::find) fn both(r: &Mat3) -> Matrix6<f64> {
     let mut out = Matrix6::zeros();
     out.fixed_view_mut::<3, 3>(0, 0).copy_from(r);

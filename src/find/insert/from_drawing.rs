@@ -1,25 +1,27 @@
-//! In: a drawing of a part and what a person says about its insertion. Out: a recipe by which the part is found without
-//! ever having been scanned. Frame and unit: part frame; mm, degrees.
+//! In: a drawing of a part and what the user states about its insertion. Out: a recipe by which the part is found
+//! without ever having been scanned.
+//! Frame and unit: part frame; mm, degrees.
 
 use super::recipe::{InsertionSpec, Recipe};
 use crate::fault::Result;
 use crate::find::measure::construct::{Build, Construction};
 use crate::find::model::drawing::Drawing;
 
-/// What a drawing does not say.
+/// What a drawing does not state.
 #[derive(Clone, Debug)]
 pub struct TaskOptions {
-    /// What the recipe and its files are called.
+    /// Name of the recipe and its files.
     pub name: String,
     /// Edge of a cell of the map that is searched, mm.
     pub cell_mm: f64,
-    /// How many turns about z make the part look nearly alike.
+    /// Number of turns about z at which the part looks nearly alike.
     pub alike_turns: u32,
-    /// Where the tool goes, and what the insertion bears.
+    /// Where the tool goes, and the tolerances of the insertion.
     pub insertion: InsertionSpec,
 }
 
-/// A recipe with every gate at its default. Each array of shapes is offered as a lattice fit.
+/// A recipe with every gate at its default. Each array of shapes gets a lattice construction. Refuses what
+/// [`Recipe::check`] refuses.
 pub fn recipe_of(drawing: Drawing, options: &TaskOptions) -> Result<Recipe> {
     let arrays = drawing.shape.iter().filter(|s| s.grid.is_some()).filter_map(|s| s.name.clone());
     let lattice = |of: String| Construction {

@@ -1,5 +1,5 @@
-//! In: the search's matches and their rivals, a scan's points, a recipe. Out: the pose that the points agree with,
-//! measured, and its lead over the best pose that they leave possible.
+//! In: the search's matches and their rivals, a scan's points, a recipe. Out: the measured pose that the points agree
+//! with, and its lead over the best rival that the points allow.
 //! Frame and unit: base frame, mm; poses of matches in px of the map.
 
 use super::recipe::Recipe;
@@ -20,9 +20,9 @@ pub(super) struct Judged {
     pub measured: Measured,
 }
 
-/// Measures at the best match and, where the points do not agree with the drawing there, at its rivals
-/// and at the other matches: a long part shifted along itself scores nearly as well in the search, but
-/// its surfaces do not end where they should.
+/// Measures at the best match. Where the points do not agree with the drawing there, measures at its rivals and at the
+/// other matches too. A long part shifted along itself scores nearly as well in the search, but its surfaces do not end
+/// where they should.
 pub(super) fn best_hypothesis(
     points: &Ordered,
     map: &HeightMap,
@@ -44,7 +44,7 @@ pub(super) fn best_hypothesis(
     let searched = std::iter::once(best.clone()).chain(rivals).chain(matches.iter().skip(1).cloned()).take(MOST);
     let slid = |(m, start): (Match, Rigid<Base, Part>)| (m, slide(points, &drawing, start, &recipe.measure));
     let starts = expected.map(|e| slid((best.clone(), *e))).into_iter();
-    // Before its rivals the best match itself, where the points say that it lies.
+    // Before its rivals, the best match is tried again at the position to which the points settle it.
     let settled = std::iter::once_with(|| {
         let start = settle(points, &drawing, lift(&best.pose, map, points, recipe), &recipe.measure);
         (best.clone(), start)
@@ -104,8 +104,9 @@ pub(super) fn lift(pose: &Pose, map: &HeightMap, points: &Ordered, recipe: &Reci
     base_from_part * Rigid::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.0, (best as f64 + 0.5) * bin))
 }
 
-/// Lead of what was measured over the best rival, 1 - second / first. A score that the points contradict counts for
-/// less: a map's edges fit as well where a part is shifted by the length of its shadow, but no point lies in a shadow.
+/// Lead of the measured pose over the best rival, 1 - second / first. A rival's score counts for less where the points
+/// contradict it. A map's edges fit as well where a part is shifted by the length of its shadow, but no point lies in a
+/// shadow.
 pub(super) fn lead(
     points: &Ordered,
     map: &HeightMap,
@@ -115,7 +116,7 @@ pub(super) fn lead(
     agreement: &Agreement,
 ) -> f64 {
     let weighed = |(rival, score): &(Pose, f64)| {
-        // A rival that is behind anyway need not be measured.
+        // A rival that is far enough behind need not be measured.
         if *score < (1.0 - recipe.gates.min_margin) * found.score {
             return *score;
         }
@@ -125,8 +126,8 @@ pub(super) fn lead(
     1.0 - rivals.map(weighed).fold(0.0, f64::max) / found.score.max(1e-9)
 }
 
-/// What the points say of a rival, 0 to 1; 0 where it cannot be measured or ends at the pose that was taken or at one
-/// of its alike turns.
+/// How well the points agree with a rival, 0 to 1. It is 0 where the rival cannot be measured, or where its measurement
+/// ends at the taken pose or at one of its alike turns.
 fn agreement_at(rival: &Pose, points: &Ordered, map: &HeightMap, recipe: &Recipe, taken: &Rigid<Base, Part>) -> f64 {
     let drawing = recipe.drawing();
     let Ok(measured) = measure(points, &drawing, lift(rival, map, points, recipe), &recipe.measure) else { return 0.0 };
@@ -137,17 +138,17 @@ fn agreement_at(rival: &Pose, points: &Ordered, map: &HeightMap, recipe: &Recipe
     if same { 0.0 } else { judge(points, &drawing, &measured, &recipe.measure).agreement }
 }
 
-/// The turns at which the part looks nearly alike, rad; the first is none.
+/// The turns at which the part looks nearly alike, rad; the first is 0.
 fn alike_turns(recipe: &Recipe) -> impl Iterator<Item = f64> {
     let n = recipe.alike_turns;
     (0..n).map(move |k| std::f64::consts::TAU * f64::from(k) / f64::from(n))
 }
 
-/// Turns nearer than this are one, rad.
+/// Turns that differ by less than this count as one, rad.
 const SAME_TURN: f64 = 3.0 / 180.0 * std::f64::consts::PI;
 
-/// True for a pose at one of the part's alike turns or, of a long part, shifted along itself: the points tell those
-/// apart by themselves.
+/// True for a pose at one of the part's alike turns or, for a long part, shifted along itself: the points themselves
+/// distinguish such poses.
 fn alike(pose: &Pose, found: &Pose, recipe: &Recipe) -> bool {
     let long = long_axis(&recipe.drawing());
     alike_turns(recipe).any(|turn| {
@@ -155,7 +156,7 @@ fn alike(pose: &Pose, found: &Pose, recipe: &Recipe) -> bool {
         let (dx, dy) = ((pose.x - found.x) * recipe.cell_mm, (pose.y - found.y) * recipe.cell_mm);
         let (along, across) = (c * dx + s * dy, c * dy - s * dx);
         let free = |axis: usize, shift: f64| long == Some(axis) || shift.abs() < 1.0;
-        // A shift of a long part swings its middle aside by what the turn is off.
+        // An error of the turn swings the middle of a long part sideways when it is shifted.
         let swing = if long.is_some() { 3.0 } else { 1.0 };
         turn_between(pose.angle - found.angle, turn) < SAME_TURN && free(0, along / swing) && free(1, across / swing)
     })

@@ -1,5 +1,5 @@
-//! In: a scan's points, a recipe, optionally the rig's calibrations. Out: where the tool goes, how sure
-//! that is and why, or a refusal: no pose leaves with a failed gate.
+//! In: a scan's points, a recipe, optionally the rig's calibrations. Out: where the tool goes, how certain that is and
+//! why, or a refusal: no pose is reported when a gate failed.
 //! Frame and unit: base frame; mm, degrees; sigmas along the part's own axes.
 
 use super::budget::{Budget, budget};
@@ -31,17 +31,17 @@ use crate::scan::{CloudPoint, GridOptions, HeightMap, Shots, grid};
 /// What else is known about a scan.
 #[derive(Clone, Debug)]
 pub struct LocateOptions {
-    /// Direction towards the camera in the base frame, unit length not needed. By default where the
-    /// rig's camera stood, without a rig z.
+    /// Direction towards the camera in the base frame, unit length not needed. Default: the direction in which the
+    /// camera was during the scan, or z where its pose is unknown.
     pub up: Option<Vec3>,
     /// Notation of the poses for the robot. Default the 4x4 matrix.
     pub robot: Convention,
     /// A GPU for the coarse search; the result is the same without.
     pub accelerator: Option<Accelerator>,
-    /// Where another look found the part: tried before what the search finds. From the side a part hides some of its
-    /// own edges, and the best match may lie beside it.
+    /// The part's pose from another scan, which is tried before what the search finds. From the side a part hides some
+    /// of its own edges, and the best match may lie beside it.
     pub expected: Option<Rigid<Base, Part>>,
-    /// List every place that looks like the part.
+    /// Whether to list every place that looks like the part.
     pub all: bool,
 }
 
@@ -52,16 +52,17 @@ impl Default for LocateOptions {
 }
 
 impl LocateOptions {
-    /// For another look at the part of `first`: heights stay those above that part, which is expected where it was.
+    /// Options for another scan of the part of `first`: the height axis remains that part's normal, and the part is
+    /// expected at the same pose.
     pub fn again(self, first: &Report) -> LocateOptions {
         let up = self.up.or_else(|| Some(first.base_from_part.direction(&Vec3::z())));
         LocateOptions { up, expected: Some(first.base_from_part), ..self }
     }
 }
 
-/// Finds the part of a recipe in a cloud. A part that is not there, or that is seen too badly to be
-/// measured, is a `Fault`; one that was measured but misses a gate is a report without poses. Either says so where
-/// the part goes on beyond the rim of the scan.
+/// Finds the part of a recipe in a cloud. A part that is absent, or is seen too poorly to be measured, is a `Fault`. A
+/// part that was measured but misses a gate gives a report without poses. Both state whether the part extends beyond
+/// the rim of the scan.
 pub fn locate(
     cloud: &[CloudPoint],
     shots: &Shots,
@@ -84,10 +85,10 @@ pub fn locate(
     }
 }
 
-/// Whether the part goes on beyond the rim of a scan in which it was not found or not measured well enough.
+/// Whether the part extends beyond the rim of a scan in which it was not found or not measured well enough.
 ///
 /// # Errors
-/// As [`locate`], for a cloud or a recipe that cannot be used.
+/// Those of [`locate`] for a cloud or a recipe that cannot be used.
 pub fn beyond_rim(
     cloud: &[CloudPoint],
     shots: &Shots,
@@ -126,9 +127,9 @@ fn located(
     Ok(Report { all, ..report })
 }
 
-/// A part beyond the rim, among the places that score what a part does of which a piece is missing.
+/// A part that extends beyond the rim, among the places that score as a part with a missing piece does.
 fn partly(points: &Ordered, map: &HeightMap, recipe: &Recipe, options: &LocateOptions) -> Result<Option<CutOff>> {
-    /// Edges beyond the rim are places without a slope, which count half.
+    /// Share of the usual score limit. Edges beyond the rim are places without a slope, which count half.
     const OF_A_PIECE: f64 = 0.6;
     let least = OF_A_PIECE * recipe.search.min_score.min(recipe.gates.min_score);
     Ok(cut_off(points, map, recipe, &search(map, recipe, options, least)?))
@@ -148,7 +149,7 @@ fn search(map: &HeightMap, recipe: &Recipe, options: &LocateOptions, least: f64)
     find_on(&scene, &model, &search, options.accelerator.as_ref())
 }
 
-/// The layers of a height map that a recipe wants.
+/// The layers of a height map that a recipe names.
 pub fn scene_of(map: &HeightMap, layers: &[Kind]) -> Result<Scene> {
     let (w, h) = (map.width as usize, map.height as usize);
     let layers = layers
@@ -174,7 +175,7 @@ fn model_of(recipe: &Recipe, scene: &Scene) -> Result<ShapeModel> {
     Ok(model)
 }
 
-/// A part as the points say that it lies.
+/// A match with its pose as measured on the points, and what the points show there.
 struct Examined {
     found: Match,
     measured: Measured,
@@ -184,7 +185,7 @@ struct Examined {
     notes: Vec<String>,
 }
 
-/// Measures the part, the right way round, and constructs on it what the recipe wants.
+/// Measures the part, decides which of its alike turns it has, and builds the recipe's constructions on it.
 fn examine(
     points: &Ordered,
     map: &HeightMap,
@@ -208,9 +209,9 @@ fn examine(
     Ok(Examined { found, measured, agreement, turns, constructions, notes })
 }
 
-/// The part as measured or turned, as the points say where the two differ. Where too few of them tell, they may at
-/// the turned pose, unless somebody expects the one that was measured: a score's last digit has chosen between the
-/// two, and neither is quite in place.
+/// The pose as measured or turned, as decided by the points where the two differ. If too few points decide at the
+/// measured pose, the turned pose is tried, unless the measured one was expected. In that case the last digit of a
+/// score chose between the two, and neither pose is quite right.
 fn right_way_round(
     points: &Ordered,
     recipe: &Recipe,
@@ -249,7 +250,8 @@ fn right_way_round(
     Ok((measured, turns))
 }
 
-/// The recipe's constructions. One that cannot be built does not hinder the others, unless it is the one used.
+/// Builds the recipe's constructions. One that cannot be built is skipped, unless it is the one that the insertion
+/// uses.
 fn construct(recipe: &Recipe, drawing: &Drawing, measured: &Measured, notes: &mut Vec<String>) -> Result<Vec<Built>> {
     let seen = features(&measured.observations, measured.growth, &recipe.measure);
     let mut constructions: Vec<Built> = Vec::new();
@@ -281,7 +283,7 @@ fn conclude(
     let disagreement = disagreement(recipe, &part.constructions);
     let lead = lead(points, map, recipe, &part.found, &part.measured.base_from_part, &part.agreement);
     let mut gates = gates(&recipe.gates, &part, lead, &budget, disagreement);
-    // Where another look says where the part lies, no other place is in question: the looks have to agree.
+    // Where another scan states the part's pose, no other place is in question: the scans have to agree.
     gates.retain(|g| options.expected.is_none() || g.name != "margin");
     gates.extend(sizes.as_ref().map(|s| s.gate(&recipe.gates)));
     let reasons: Vec<String> =
@@ -329,22 +331,22 @@ fn conclude(
     })
 }
 
-/// Distance between the two-pin construction and the lattice, mm, and what their own noise makes expect of it; `None`
-/// where one of them is missing.
+/// Distance between the two-pin construction and the lattice, mm, and the distance expected from their own noise;
+/// `None` where one of them is missing.
 fn disagreement(recipe: &Recipe, constructions: &[Built]) -> Option<(f64, f64)> {
     let named = |name: &Option<String>| constructions.iter().find(|b| Some(&b.name) == name.as_ref());
     let (a, b) = (named(&recipe.insertion.two_pin)?, named(&recipe.insertion.lattice)?);
     let apart = (a.deviation_mm[0] - b.deviation_mm[0]).hypot(a.deviation_mm[1] - b.deviation_mm[1]);
-    // Sigmas are along each axis.
+    // The sigmas hold along each of two axes.
     Some((apart, std::f64::consts::SQRT_2 * a.measured.sigma_mm.hypot(b.measured.sigma_mm)))
 }
 
-/// What a distance is on average beyond what noise makes of it.
+/// A distance after the noise expected in it is subtracted, in quadrature.
 fn beyond_noise((apart, noise): (f64, f64)) -> f64 {
     (apart * apart - noise * noise).max(0.0).sqrt()
 }
 
-/// A construction's deviation moves the part's pose in its plane: the nominal place comes to lie on the measured one.
+/// The motion of the part's pose in its plane that brings a construction's nominal place to the measured one.
 fn moved_by(b: &Built) -> Rigid<Part, Part> {
     let turn = b.deviation_deg.unwrap_or(0.0).to_radians();
     let (s, c) = turn.sin_cos();
@@ -355,19 +357,19 @@ fn moved_by(b: &Built) -> Rigid<Part, Part> {
     )
 }
 
-/// The part's sizes against what the calibrations make expect; they are the robot's and the camera's as much as the
-/// part's.
+/// The part's sizes compared with what the calibrations predict. Deviations come from the robot and the camera as much
+/// as from the part.
 fn size_check(budget: &Budget, recipe: &Recipe) -> Option<SizeCheck> {
     let (shape, seen) = (budget.shape.as_ref()?, budget.seen.as_ref()?);
     Some(SizeCheck::new(shape, &budget.levers, &seen.scan_axes(), recipe.measure.size_sigma))
 }
 
-/// What is said of a pose that rests on one look.
+/// Note on a pose that rests on one scan.
 const ONE_LOOK: &str = "not cross-checked: one look cannot show what calibrations, delay, convention or robot got \
                         wrong; \
     plan a second one with sheetlight second-look";
 
-/// What is said of a part that cannot tell pictures from their mirror images.
+/// Note on a part that cannot reveal mirrored pictures.
 const SAME_IN_A_MIRROR: &str =
     "the part is its own mirror image: one look cannot tell mirrored pictures (ReverseX, ReverseY)";
 
@@ -391,14 +393,14 @@ fn poses_at(base_from_part: &Rigid<Base, Part>, recipe: &Recipe, robot: Conventi
     }
 }
 
-/// True where the insertion bears three standard deviations.
+/// True where three standard deviations lie within the insertion's tolerances.
 fn within_tolerance(recipe: &Recipe, sigma_mm: [f64; 3], sigma_deg: [f64; 3]) -> bool {
     let turn = sigma_deg.iter().copied().fold(0.0, f64::max);
     3.0 * sigma_mm[0].max(sigma_mm[1]) <= recipe.insertion.tolerance_mm && 3.0 * turn <= recipe.insertion.tolerance_deg
 }
 
-/// One report from several looks at the same part: the agreed pose, what the looks disagree about, and the gates on
-/// it. Every look must have met its own gates. Errors: none of the looks, or a covariance that cannot be inverted.
+/// One report from several scans of the same part: the agreed pose, the disagreement between the scans, and the gates
+/// on it. Every scan must have passed its own gates. Errors: an empty list, or a covariance that cannot be inverted.
 pub fn agree(reports: Vec<Report>, witness: Option<&Witness>, recipe: &Recipe, robot: Convention) -> Result<Report> {
     let looks: Vec<Look> =
         reports.iter().map(|r| Look { base_from_part: r.base_from_constructed, budget: &r.budget }).collect();
@@ -428,15 +430,15 @@ pub fn agree(reports: Vec<Report>, witness: Option<&Witness>, recipe: &Recipe, r
     Ok(report)
 }
 
-/// The gate of recipes that ask for more than one look; several looks meet it together.
+/// The gate of recipes that require more than one scan; several scans pass it together.
 const LOOKS: &str = "number of looks";
 
-/// The gates that a look missed by itself, in words.
+/// The gates that a single scan missed, in words.
 fn missed(gates: &[Gate]) -> impl Iterator<Item = String> {
     gates.iter().filter(|g| !g.passed && g.name != LOOKS).map(Gate::words)
 }
 
-/// What the recipe asks of a part and of the pose that was measured.
+/// What the recipe requires of a part and of the measured pose.
 fn gates(g: &Gates, part: &Examined, lead: f64, budget: &Budget, disagreement: Option<(f64, f64)>) -> Vec<Gate> {
     let (least, most, agreement) = (Gate::least, Gate::most, &part.agreement);
     let mut out = vec![
@@ -467,7 +469,8 @@ mod tests {
     use crate::scan::Along;
     use std::path::Path;
 
-    /// 0.25 mm between constructions that each scatter by 0.12 mm is 0.18 mm on average beyond their noise.
+    /// Two constructions 0.25 mm apart, each with a scatter of 0.12 mm, are 0.18 mm apart on average beyond their
+    /// noise.
     #[test]
     fn noise_is_no_disagreement() {
         assert!((beyond_noise((0.25, 0.12 * std::f64::consts::SQRT_2)) - 0.183).abs() < 1e-3);
@@ -475,8 +478,8 @@ mod tests {
         assert_eq!(beyond_noise((2.54, 0.0)), 2.54);
     }
 
-    /// The clock oscillator's socket by its recipe, 3 mm above a table, with as few points where its two turns
-    /// differ: in the corner that is cut, and in the one across from it.
+    /// The clock oscillator's socket by its recipe, 3 mm above a table. Where its two turns differ, there are only
+    /// `told_by` points, all of them in the cut corner; the opposite corner has none.
     fn socket(recipe: &Recipe, told_by: usize) -> Ordered {
         let drawing = recipe.drawing();
         let top = &drawing.faces()[0];
@@ -508,9 +511,8 @@ mod tests {
         let right = measure(&points, &drawing, Rigid::identity(), &recipe.measure).unwrap();
         let votes = |m: &Measured| vote(&points, &drawing, &m.base_from_part, recipe.alike_turns, &recipe.measure)[0];
         assert_eq!(votes(&right).told(), Some(true), "{:?}", votes(&right));
-        // The wrong way round and pulled aside, farther and farther: first the points say so, then
-        // they lie beside its edges; from half a millimetre on they seem to say the reverse, but no measurement ends
-        // there.
+        // Turned by half a turn and shifted step by step. At first the points vote against this pose, then they lie
+        // beside its edges. From half a millimetre on they seem to vote for it, but no measurement ends there.
         let half: Rigid<Part, Part> = Rigid::from_vectors(&(Vec3::z() * std::f64::consts::PI), Vec3::zeros());
         let mut left_open = 0;
         for step in 0..100 {
@@ -525,7 +527,7 @@ mod tests {
             let off = found.base_from_part.rotation_vector().norm().to_degrees();
             assert!(off < 1.0 && turns[0].told() == Some(true), "step {step}: {off} degrees, {turns:?}, {notes:?}");
             assert_eq!(notes.len(), 1);
-            // Who expects the pose keeps it where the points leave it open.
+            // An expected pose is retained where the points do not decide.
             if votes(&wrong).told().is_none() {
                 let (kept, _) = right_way_round(&points, &recipe, true, wrong.clone(), &mut notes).unwrap();
                 assert_eq!(kept.base_from_part, wrong.base_from_part);

@@ -1,5 +1,5 @@
-//! In: a report of an insertion with its height map. Out: a picture for people: the page's picture of the heights, the
-//! drawing laid over it where the part was measured, its axes.
+//! In: a report of an insertion with its height map. Out: a picture for people: the heights as the page shows them,
+//! with the drawing at the measured pose and the part's axes.
 //! Frame and unit: pixels of that picture; the grid's y goes up.
 
 use super::locate::Report;

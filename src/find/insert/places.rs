@@ -9,16 +9,16 @@ use crate::scan::HeightMap;
 /// A place that looks like the part; only the best one is measured on the points.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Place {
-    /// As of a [`Match`].
+    /// Score of the [`Match`].
     pub score: f64,
-    /// The part's origin on the map's surface, in the scan's frame, mm; at the grid's own height where nothing was
+    /// The part's origin on the map's surface, in the scan's frame, mm; at height 0 of the grid where nothing was
     /// measured there.
     pub at_mm: [f64; 3],
     /// Turn in the map, x towards y, degrees.
     pub angle_deg: f64,
-    /// Standard deviations of its place in the map, mm.
+    /// Standard deviations of its position in the map, mm.
     pub sigma_mm: Option<[f64; 2]>,
-    /// Of the turn, degrees.
+    /// Standard deviation of the turn, degrees.
     pub sigma_deg: f64,
 }
 

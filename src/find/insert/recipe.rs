@@ -1,5 +1,5 @@
-//! In: a recipe (TOML): what a part looks like, how it is searched and measured, what is constructed on
-//! it, where the tool goes, and below which quality no pose leaves.
+//! In: a recipe (TOML): what a part looks like, how it is searched and measured, what is constructed on it, where the
+//! tool goes, and the quality that a pose must reach.
 //! Out: the same, checked. Frame and unit: part frame; mm, degrees.
 
 use crate::fault::{Fault, Result};
@@ -19,9 +19,9 @@ use std::path::Path;
 pub struct Recipe {
     /// Version of this format: 1.
     pub format: u32,
-    /// What messages and files call the part.
+    /// Name of the part in messages and files.
     pub name: String,
-    /// For people; may be empty.
+    /// Title for people; may be empty.
     #[serde(default)]
     pub title: String,
     /// Edge of a cell of the map that is searched, mm, 0.0001 to 500. About two sampling steps.
@@ -29,14 +29,14 @@ pub struct Recipe {
     /// Layers that are searched. Default height alone.
     #[serde(default = "height")]
     pub layers: Vec<Kind>,
-    /// How many turns about z make the part look nearly alike (2: half a turn). Told apart by what is
-    /// seen where they differ. 1 to 8.
+    /// Number of turns about z at which the part looks nearly alike (2: half a turn), 1 to 8. They are distinguished by
+    /// what is seen where they differ.
     #[serde(default = "one")]
     pub alike_turns: u32,
     /// How the part is searched in the map.
     #[serde(default)]
     pub search: SearchOptions,
-    /// How the drawing becomes the edge places of the search.
+    /// How the drawing becomes the edge points of the search.
     #[serde(default)]
     pub model: ModelOptions,
     /// How the pose is measured on the points.
@@ -47,9 +47,9 @@ pub struct Recipe {
     /// Points, lines and lattices built on the measured part; later ones may use earlier ones.
     #[serde(default)]
     pub construction: Vec<Construction>,
-    /// Where the tool goes, and what the insertion bears.
+    /// Where the tool goes, and the tolerances of the insertion.
     pub insertion: InsertionSpec,
-    /// Below which quality no pose leaves.
+    /// Limits on quality; a pose that misses one is not reported.
     #[serde(default)]
     pub gates: Gates,
     /// What the robot adds to the uncertainty.
@@ -64,7 +64,7 @@ pub struct InsertionSpec {
     /// "pose": the part's pose from all edges; or the name of a construction whose deviation moves it.
     #[serde(default = "pose")]
     pub construction: String,
-    /// The paper's construction and the lattice fit, whose disagreement is reported and gated.
+    /// Name of the two-pin construction (the paper's); its disagreement with the lattice fit is reported and gated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub two_pin: Option<String>,
     /// Name of the lattice construction that `two_pin` is compared with.
@@ -76,18 +76,20 @@ pub struct InsertionSpec {
     /// The tool's turn about the part's z, degrees.
     #[serde(default)]
     pub turn_deg: f64,
-    /// Distances above the insertion pose along the part's z, mm, [`InsertionSpec::least_above_mm`] to 1000.
+    /// Distance of the approach pose above the insertion pose along the part's z, mm, [`InsertionSpec::least_above_mm`]
+    /// to 1000.
     pub approach_mm: f64,
-    /// The same for the way back.
+    /// The same distance for the retract pose.
     pub retract_mm: f64,
-    /// What the insertion bears: 3 sigma in the plane must stay within it, mm and degrees.
+    /// Tolerance of the insertion in the plane, mm, 0.0001 to 100: 3 sigma must stay within it.
     pub tolerance_mm: f64,
-    /// Of any turn, 3 sigma, degrees, 0.001 to 10.
+    /// Tolerance of any turn, degrees, 0.001 to 10: 3 sigma must stay within it.
     pub tolerance_deg: f64,
 }
 
 impl InsertionSpec {
-    /// The tool goes to the part's own pose; tolerances in the plane and as a turn, distances above it.
+    /// The tool goes to the part's own pose. `tolerance` holds in the plane, mm, and as a turn, degrees; the distances
+    /// are above the pose, mm.
     pub fn at_the_part(tolerance: (f64, f64), approach_mm: f64, retract_mm: f64) -> InsertionSpec {
         InsertionSpec {
             construction: pose(),
@@ -104,7 +106,7 @@ impl InsertionSpec {
 }
 
 impl Recipe {
-    /// A drawing and a task; all else, gates too, as where a file names nothing.
+    /// A recipe from a drawing and a task; all else, including the gates, has its default value.
     pub fn new(name: &str, cell_mm: f64, shape: Vec<Shape>, insertion: InsertionSpec) -> Recipe {
         Recipe {
             format: 1,
@@ -125,13 +127,13 @@ impl Recipe {
     }
 }
 
-/// No pose leaves when one of these is missed.
+/// Limits on quality: no pose is reported when one of them is missed.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Gates {
     /// Least search score, 0 to 1.
     pub min_score: f64,
-    /// Least lead over the best other pose, 1 - second / first, 0 to 1; alike turns are told apart apart.
+    /// Least lead over the best other pose, 1 - second / first, 0 to 1; alike turns are decided separately.
     pub min_margin: f64,
     /// Largest standard deviation in the plane and along z, mm.
     pub max_sigma_mm: f64,
@@ -147,19 +149,19 @@ pub struct Gates {
     pub max_crossed: f64,
     /// Largest disagreement between the two-pin construction and the lattice fit beyond their own noise, mm.
     pub max_disagreement_mm: f64,
-    /// False lets a part pass whose alike turns could not be told apart.
+    /// False lets a part pass whose alike turns could not be distinguished.
     pub turn_must_be_told: bool,
-    /// True refuses a pose that rests on one look alone.
+    /// True refuses a pose that rests on one scan alone.
     pub second_look: bool,
-    /// Largest disagreement of two looks over what all covariances make expect, 1 to 10.
+    /// Largest disagreement of two scans relative to what all covariances predict, 1 to 10.
     pub max_look_ratio: f64,
-    /// Least turn about the part's normal and least tilt against it from one look to the other, degrees, 0 to 180 and
-    /// 0 to 60: looks from one side make the same error twice.
+    /// Least turn about the part's normal from one scan to the other, degrees, 0 to 180: scans from one side repeat the
+    /// same error.
     pub min_look_turn_deg: f64,
-    /// Least tilt against the part's normal from one look to the other, degrees, 0 to 60.
+    /// Least tilt against the part's normal from one scan to the other, degrees, 0 to 60.
     pub min_look_tilt_deg: f64,
-    /// Largest error along the part's normal that several looks may leave unseen, mm, 0.00001 to 100; in the plane
-    /// and as a turn the insertion's tolerances hold.
+    /// Largest error along the part's normal that several scans may leave undetected, mm, 0.00001 to 100. In the plane
+    /// and as a turn, the insertion's tolerances are the limits.
     pub max_unseen_height_mm: f64,
 }
 
@@ -185,11 +187,11 @@ impl Default for Gates {
     }
 }
 
-/// What the robot itself adds.
+/// What the robot itself adds to the uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RobotSpec {
-    /// Standard deviation of a reached position, mm, and turn, degrees: its repeatability.
+    /// Standard deviation of a reached position, mm, 0 to 10: the robot's repeatability.
     pub sigma_mm: f64,
     /// Standard deviation of a reached turn about each axis, degrees, 0 to 10.
     pub sigma_deg: f64,
@@ -255,7 +257,7 @@ impl Recipe {
         self.measure.check()?;
         let drawing = self.drawing();
         drawing.check()?;
-        // Coarser cells show nothing of the part.
+        // Coarser cells cannot resolve the part.
         let b = drawing.bounds();
         range("cell_mm", self.cell_mm, 0.0, (b[2] - b[0]).max(b[3] - b[1]) / 8.0)?;
         if drawing.faces().is_empty() {
@@ -279,11 +281,10 @@ fn range(name: &str, v: f64, a: f64, b: f64) -> Result<()> {
     }
 }
 
-/// An arm counts as arrived within 0.2 mm of where it was sent (docs/robots.md): at the part and above it that may add
-/// up, and a
-/// tenth of a millimetre is left.
+/// An arm counts as arrived within 0.2 mm of its target (docs/robots.md). The errors at the part and above it may add
+/// up, and a tenth of a millimetre is left as clearance.
 const CLEAR_MM: f64 = 0.5;
-/// Farther off the tool has left the part's surroundings.
+/// Beyond this distance the tool has left the part's surroundings.
 const MOST_ABOVE_MM: f64 = 1000.0;
 
 fn above(name: &str, mm: f64, least: f64) -> Result<()> {
@@ -299,9 +300,9 @@ fn above(name: &str, mm: f64, least: f64) -> Result<()> {
 }
 
 impl InsertionSpec {
-    /// The tool is above the part from here on, mm above the insertion pose: as much as lies between the lowest and
-    /// the highest of
-    /// what is drawn and the insertion pose, and a clearance. How long the component is nobody says: it may need more.
+    /// Least distance above the insertion pose at which the tool is clear of the part, mm. It reaches from the lowest
+    /// of the drawn shapes and the insertion pose to the highest drawn shape, plus a clearance. The length of the
+    /// component is unknown: it may need more.
     pub fn least_above_mm(&self, drawing: &Drawing) -> f64 {
         let heights = drawing.shape.iter().map(|s| s.z_mm);
         let low = heights.clone().fold(self.offset_mm[2], f64::min);
@@ -309,7 +310,7 @@ impl InsertionSpec {
         (high - low).max(0.0) + CLEAR_MM
     }
 
-    /// Refuses values out of range, and names that are no construction.
+    /// Refuses values out of range, and names that refer to no construction.
     fn check(&self, constructions: &[Construction], drawing: &Drawing) -> Result<()> {
         range("offset_mm", self.offset_mm[2], -1e4, 1e4)?;
         let least = self.least_above_mm(drawing);
@@ -365,8 +366,8 @@ mod tests {
         Recipe::parse(&text.replace("retract_mm = 80", &format!("retract_mm = {retract}")))
     }
 
-    /// A retract pose that is the insertion pose leaves the tool in the part; an approach pose that is it goes in
-    /// unasked.
+    /// A retract pose equal to the insertion pose leaves the tool in the part; an approach pose equal to it inserts the
+    /// tool unasked.
     #[test]
     fn the_tool_is_above_the_part_before_and_after() {
         let dimm = include_str!("../../../data/recipes/dimm.toml");
@@ -387,10 +388,10 @@ mod tests {
             let says = fault.what.contains(names) && fault.what.contains("8.850 to 1000");
             assert!(says && fault.next.contains("in the recipe to more than"), "{fault}");
         }
-        // The tool's origin high above the part, as with a long component in it: the way up is as long all the same.
+        // The tool's origin is high above the part, as with a long component in it: the way up is just as long.
         let high = dimm.replace("[insertion]", "[insertion]\noffset_mm = [0, 0, 20]");
         assert!(with(&high, "40", "8.84").is_err() && with(&high, "40", "8.86").is_ok());
-        // Its origin far below what is drawn: it has to come out of there.
+        // The tool's origin is far below what is drawn: the tool has to come up from there.
         let deep = dimm.replace("[insertion]", "[insertion]\noffset_mm = [0, 0, -10]");
         assert!(with(&deep, "40", "18.4").is_err() && with(&deep, "40", "18.6").is_ok());
     }

@@ -1,5 +1,5 @@
-//! In: a scan's points and map, a recipe, poses at which the part may lie. Out: whether the part goes on beyond the
-//! rim of what was scanned, past which side, how far, and how the sweep has to move to hold it.
+//! In: a scan's points and map, a recipe, poses at which the part may lie. Out: whether the part extends beyond the rim
+//! of the scan, past which side, how far, and how the sweep has to move to cover it.
 //! Frame and unit: the scan's frame, mm; the scanned area in the map's grid.
 
 use super::hypothesis::lift;
@@ -13,20 +13,20 @@ use crate::find::search::full::Match;
 use crate::geometry::{Vec2, Vec3};
 use crate::scan::{Along, HeightMap};
 
-/// A part of which less than this share of the drawn edges was scanned is not recognised by them.
+/// A part is not recognised if less than this share of its drawn edges was scanned.
 const LEAST_SEEN: f64 = 0.3;
-/// A part with a smaller share of its edges beyond the rim is measured as it is.
+/// A part with a smaller share of its edges beyond the rim is measured as if it were complete.
 const LEAST_BEYOND: f64 = 0.02;
-/// Share of the edges within the scan at which a surface has to end, for the part to be believed there.
+/// Share of the edges within the scan at which a surface has to end for the pose to be accepted.
 const LEAST_ENDED: f64 = 0.5;
 /// Number of poses that are measured, the best first.
 const PLACES: usize = 8;
-/// Width of the surroundings that the sweep has to hold too, in units of the recipe: the part is judged by them.
+/// Width of the surroundings that the sweep has to cover too, in units of the recipe: the part is judged by them.
 const MARGIN: f64 = 3.0;
-/// Share of the points that may lie past the rim that is taken.
+/// Share of the points that may lie past the rim at each end: stray points do not define it.
 const STRAY: f64 = 0.001;
 
-/// A part that was scanned in part.
+/// A part that was scanned only in part.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct CutOff {
     /// Share of the drawn edges that lie beyond the rim, 0 to 1.
@@ -35,7 +35,7 @@ pub struct CutOff {
     pub by_mm: f64,
     /// Past which side of the scan, in words.
     pub side: &'static str,
-    /// The sweep holds the whole part when it is moved by this, in the scan's frame, mm.
+    /// Shift in the scan's frame after which the sweep covers the whole part, mm.
     pub sweep_by_mm: Vec3,
 }
 
@@ -50,7 +50,7 @@ impl CutOff {
         )
     }
 
-    /// The refusal of a part that cannot be measured because of it.
+    /// The error for a part that cannot be measured because it is cut off.
     pub fn fault(&self, recipe: &str) -> Fault {
         let [x, y, z]: [f64; 3] = self.sweep_by_mm.into();
         Fault::refused(format!("'{recipe}' was not scanned whole: {}", self.words()))
@@ -59,7 +59,7 @@ impl CutOff {
     }
 }
 
-/// How the part goes on beyond the rim at the match that agrees best with the points inside. `None`: no match reaches
+/// How the part extends beyond the rim, at the match that agrees best with the points inside. `None`: no match reaches
 /// beyond the rim and agrees with the points.
 pub(super) fn cut_off(points: &Ordered, map: &HeightMap, recipe: &Recipe, matches: &[Match]) -> Option<CutOff> {
     let drawing = recipe.drawing();
@@ -94,7 +94,7 @@ pub(super) fn cut_off(points: &Ordered, map: &HeightMap, recipe: &Recipe, matche
     best.map(|b| b.1)
 }
 
-/// One of the two ways in which a scan grows: from shot to shot, or along the stripe.
+/// One of the two directions in which a scan grows: from shot to shot, or along the stripe.
 struct Way {
     /// Unit vector towards larger numbers, across the lines of equal number.
     towards: Vec2,
@@ -104,7 +104,7 @@ struct Way {
     sides: [&'static str; 2],
 }
 
-/// What was scanned: the parallelogram between the first and the last shot and between the stripe's ends.
+/// The scanned area: the parallelogram between the first and the last shot and between the stripe's ends.
 struct Area([Way; 2]);
 
 impl Area {
@@ -123,7 +123,7 @@ impl Area {
         ]))
     }
 
-    /// How far a place lies outside, mm, negative inside, and past which side.
+    /// How far a place lies outside, mm (negative inside), and past which side.
     fn outside(&self, p: &Vec2) -> (f64, &'static str) {
         let ends = self.0.iter().flat_map(|way| {
             let at = way.towards.dot(p);
@@ -132,7 +132,7 @@ impl Area {
         ends.max_by(|a, b| a.0.total_cmp(&b.0)).expect("four sides")
     }
 
-    /// The shortest move after which the area holds the places with a margin. An area that is too small is centred on
+    /// The shortest move after which the area covers the places with a margin. An area that is too small is centred on
     /// them.
     fn move_to_hold(&self, places: &[Vec2], margin: f64) -> Vec2 {
         let by = [0, 1].map(|k| {
@@ -148,7 +148,7 @@ impl Area {
 }
 
 impl Way {
-    /// From the shot or column of each place: its slope over the plane by least squares.
+    /// Fits the shot or column number of each place over the plane by least squares; its gradient gives the direction.
     fn of(places: &[Vec2], numbers: &[f64], sides: [&'static str; 2]) -> Option<Way> {
         let n = places.len() as f64;
         let (middle, mean) = (places.iter().sum::<Vec2>() / n, numbers.iter().sum::<f64>() / n);
@@ -161,7 +161,7 @@ impl Way {
         let towards = (spread.try_inverse()? * grows).try_normalize(1e-12)?;
         let mut at: Vec<f64> = places.iter().map(|p| towards.dot(p)).collect();
         at.sort_by(f64::total_cmp);
-        // A few stray points do not make the rim.
+        // A few stray points do not define the rim.
         let end = |share: f64| at[(share * (at.len() - 1) as f64).round() as usize];
         Some(Way { towards, ends: [end(STRAY), end(1.0 - STRAY)], sides })
     }
@@ -172,7 +172,7 @@ mod tests {
     use super::*;
     use crate::scan::{CloudPoint, GridOptions, Shots, grid};
 
-    /// Scanned from x = 0 to 20 and y = 0 to 10.
+    /// An area scanned from x = 0 to 20 and y = 0 to 10.
     fn area() -> Area {
         let way = |towards: Vec2, end: f64, sides: [&'static str; 2]| Way { towards, ends: [0.0, end], sides };
         Area([way(Vec2::x(), 20.0, ["first", "last"]), way(Vec2::y(), 10.0, ["left", "right"])])
@@ -193,7 +193,7 @@ mod tests {
         assert_eq!(area().move_to_hold(&[Vec2::new(0.0, 5.0), Vec2::new(30.0, 5.0)], 0.0), Vec2::new(5.0, 0.0));
     }
 
-    /// Stripes that lie and stripes that stand: shots and the picture's sides are named as the camera saw them.
+    /// Stripes along u and along v: shots and the picture's sides are named as the camera saw them.
     #[test]
     fn sides_are_named_by_the_stripes_axis_of_the_picture() {
         for (along, before, past) in [

@@ -1,5 +1,5 @@
 //! In: one scan and a few numbers: where the body's outline, its windows and its holes lie in the map.
-//! Out: a recipe with the dimensions that the points show, proven on the same scan.
+//! Out: a recipe with the dimensions that the points show, verified on the same scan.
 //! Frame and unit: numbers in the height map's grid frame, mm; the recipe's drawing in the part frame.
 
 use super::locate::{LocateOptions, Report, locate};
@@ -14,10 +14,10 @@ use crate::find::model::shape::{Form, Inside, Shape};
 use crate::geometry::{Base, Grid, Part, Rigid, Vec3};
 use crate::scan::{CloudPoint, HeightMap, Shots};
 
-/// A few clicks' worth of numbers.
+/// The few numbers that a user states, for example by clicks.
 #[derive(Clone, Debug)]
 pub struct TeachOptions {
-    /// What the recipe and its files are called.
+    /// Name of the recipe and its files.
     pub name: String,
     /// Two opposite corners of the body's outline: x0 y0 x1 y1 in the grid, mm. The part's origin is its
     /// centre, its x axis the grid's x turned by `angle_deg`.
@@ -28,7 +28,7 @@ pub struct TeachOptions {
     pub windows: Vec<[f64; 4]>,
     /// Round holes: centre x y and radius.
     pub holes: Vec<[f64; 3]>,
-    /// Where the tool goes, and what the insertion bears; the recipe takes it over.
+    /// Where the tool goes, and the tolerances of the insertion; copied into the recipe.
     pub insertion: InsertionSpec,
 }
 
@@ -44,7 +44,7 @@ pub fn teach(cloud: &[CloudPoint], shots: &Shots, map: &HeightMap, options: &Tea
         .cause("corners swapped, or cells given for millimetres")
         .next("give x0 y0 x1 y1 in mm from the map's corner, smaller numbers first"));
     }
-    // A notch may reach over the outline.
+    // A notch may extend beyond the outline.
     let spare = 0.5 * (x1 - x0).max(y1 - y0);
     let inside = |x: f64, y: f64| (x0 - spare..=x1 + spare).contains(&x) && (y0 - spare..=y1 + spare).contains(&y);
     let windows = options.windows.iter().flat_map(|w| [[w[0], w[1], 0.0], [w[2], w[3], 0.0]]);
@@ -65,7 +65,8 @@ pub fn teach(cloud: &[CloudPoint], shots: &Shots, map: &HeightMap, options: &Tea
     let lift: Rigid<Part, Part> = Rigid::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.0, height));
     let mut pose: Rigid<Base, Part> = map.base_from_grid * grid_from_part * lift;
     let gates = MeasureOptions { edge_gate_mm: 1.0, ..MeasureOptions::default() };
-    // Each round measures with the dimensions of the last one; three bring a click's 0.5 mm to the noise.
+    // Each round measures with the dimensions of the previous one; three rounds reduce a click's error of 0.5 mm to the
+    // noise.
     for _ in 0..3 {
         let measured = measure(&points, &drawing, pose, &gates)?;
         pose = measured.base_from_part;
@@ -77,7 +78,7 @@ pub fn teach(cloud: &[CloudPoint], shots: &Shots, map: &HeightMap, options: &Tea
     Ok((recipe, proof))
 }
 
-/// Outline, windows and holes where the numbers put them.
+/// Outline, windows and holes at the stated positions.
 fn drawn(options: &TeachOptions, grid_from_part: &Rigid<Grid, Part>) -> Drawing {
     let [x0, y0, x1, y1] = options.outline;
     let local = |x: f64, y: f64| grid_from_part.inverse().point(&Vec3::new(x, y, 0.0));
@@ -128,8 +129,8 @@ fn datum_height(map: &HeightMap, grid_from_part: &Rigid<Grid, Part>, drawing: &D
     Ok((best.0 as f64 + 0.5) * BIN)
 }
 
-/// Moves sides and centres to where the points show them. A surface that reaches less far than it is
-/// long, as partly lit samples make it (about 0.05 mm a side), is taught as it is seen.
+/// Moves sides and centres to where the points show them. Partly lit samples make a surface appear shorter than it is,
+/// by about 0.05 mm a side; it is taught as it appears.
 fn adjust(drawing: &mut Drawing, measured: &Measured, options: &MeasureOptions) {
     let holes = features(&measured.observations, measured.growth, options);
     for (i, s) in drawing.shape.iter_mut().enumerate() {
@@ -165,7 +166,7 @@ fn adjust(drawing: &mut Drawing, measured: &Measured, options: &MeasureOptions) 
 }
 
 fn recipe_of(options: &TeachOptions, mut drawing: Drawing, map: &HeightMap) -> Result<Recipe> {
-    // The origin is the centre of the body as measured.
+    // The origin is the measured centre of the body.
     let origin = drawing.shape[0].centre.expect("a rectangle has one");
     for s in &mut drawing.shape {
         let micrometre = |v: f64| (v * 1000.0).round() / 1000.0;
@@ -185,7 +186,7 @@ fn recipe_of(options: &TeachOptions, mut drawing: Drawing, map: &HeightMap) -> R
     }
     let cell_mm = (2.0 * map.cell).clamp(1e-4, 500.0);
     let plain = Recipe::new(&options.name, cell_mm, drawing.shape, options.insertion.clone());
-    // A rectangle looks the same after half a turn: what was taught has no notch to tell it.
+    // A rectangle looks the same after half a turn, and the taught drawing has no notch that would distinguish the two.
     let gates = Gates { turn_must_be_told: false, min_margin: 0.0, ..Gates::default() };
     let recipe = Recipe { construction, gates, ..plain };
     recipe.check()?;

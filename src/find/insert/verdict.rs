@@ -1,5 +1,5 @@
-//! In: the points of a scan and a measured pose. Out: how far the points agree with the drawing there,
-//! how much of the part was seen, and which of its alike turns it is.
+//! In: the points of a scan and a measured pose. Out: how well the points agree with the drawing there, how much of the
+//! part was seen, and which of its alike turns it has.
 //! Frame and unit: part frame, mm.
 
 use crate::fault::Gate;
@@ -13,35 +13,35 @@ use crate::find::model::face::Face;
 use crate::geometry::{Base, Part, Rigid, Vec3};
 use std::collections::HashSet;
 
-/// What the points say about a pose.
+/// How well the points agree with a pose.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Agreement {
-    /// Share of the points inside surfaces that lie on them, and how many points that were.
+    /// Share of the points inside surfaces that lie on them.
     pub on_surface: f64,
-    /// Points inside surfaces, those near edges not counted.
+    /// Number of points inside surfaces, excluding those near edges.
     pub surface_points: usize,
-    /// Share of the points in holes and beside the part that do not lie on a surface, and how many.
+    /// Share of the points in holes and beside the part that do not lie on a surface.
     pub beside: f64,
-    /// Points in holes and beside the part, those near edges not counted.
+    /// Number of points in holes and beside the part, excluding those near edges.
     pub beside_points: usize,
-    /// The smaller of the two.
+    /// The smaller of `on_surface` and `beside`.
     pub agreement: f64,
-    /// Share of the drawn surfaces (in squares of 1.2 margins) on which points were seen.
+    /// Share of the drawn surfaces (in squares of 0.6 units of the recipe) on which points were seen.
     pub coverage: f64,
-    /// Share of the drawn edges (in pieces of a margin) at which a surface was seen to end.
+    /// Share of the drawn edges (in pieces of 0.5 units of the recipe) at which a surface was seen to end.
     pub edges: f64,
-    /// Share of the drawn edges beyond which the surface goes on: another, larger part.
+    /// Share of the drawn edges beyond which the surface continues, as on another, larger part.
     pub crossed: f64,
 }
 
-/// Lengths of the judgement, in the recipe's unit.
+/// Lengths that the judgement uses, scaled by the recipe's unit.
 #[derive(Clone, Copy)]
 struct Lengths {
-    /// Points nearer than this to an edge say nothing about what is surface and what is not, mm.
+    /// Points closer than this to an edge do not count for or against a surface, mm.
     margin: f64,
-    /// The same where turns are told apart, mm.
+    /// The same margin where turns are distinguished, mm.
     turn_margin: f64,
-    /// Ring around the part that is looked at, mm.
+    /// Width of the ring around the part in which points are counted, mm.
     ring: f64,
     square: f64,
     piece: f64,
@@ -54,7 +54,7 @@ impl Lengths {
     }
 }
 
-/// A drawing against which points are counted.
+/// A drawing, prepared for counting points against it.
 struct Drawn<'a> {
     faces: Vec<Face>,
     edges: EdgeIndex,
@@ -63,7 +63,7 @@ struct Drawn<'a> {
     options: &'a MeasureOptions,
 }
 
-/// Counts of points, and the places that they show.
+/// Counts of points, and the places at which they lie.
 #[derive(Default)]
 struct Tally {
     /// Points inside surfaces, and those of them that lie on one.
@@ -74,7 +74,7 @@ struct Tally {
     clear: usize,
     /// Squares in which a surface was seen.
     seen: HashSet<(i32, i32)>,
-    /// Pieces of edges beyond which a surface goes on.
+    /// Pieces of edges beyond which a surface continues.
     crossed: HashSet<(i32, i32, usize)>,
 }
 
@@ -83,7 +83,7 @@ pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, options: 
     judge_inside(points, drawing, measured, options, &|_, _| true)
 }
 
-/// Judges a pose by the places (x and y of the part) that were scanned; what lies beyond says nothing.
+/// Judges a pose by the places (x and y of the part) that were scanned, as `inside` states; other places are ignored.
 pub(super) fn judge_inside(
     points: &Ordered,
     drawing: &Drawing,
@@ -103,7 +103,7 @@ pub(super) fn judge_inside(
     let pieces: HashSet<_> = scanned.map(|s| drawn.piece(s.x, s.y, s.shape)).collect();
     let share = |n: usize, of: usize| if of == 0 { 0.0 } else { n as f64 / of as f64 };
     let on_surface = share(tally.on, tally.inside);
-    // Without any point beside the part nothing contradicts it there.
+    // Without any point beside the part, nothing contradicts the pose there.
     let free = if tally.beside == 0 { 1.0 } else { share(tally.clear, tally.beside) };
     let (covered, squares) = drawn.covered(&tally.seen, inside);
     Agreement {
@@ -129,7 +129,8 @@ impl Drawn<'_> {
         ((x / side).floor() as i32, (y / side).floor() as i32, shape)
     }
 
-    /// Points at and around the part, by what the drawing has there; those near edges say only that a surface was seen.
+    /// Counts points at and around the part by what the drawing has there. Those near edges only show that a surface
+    /// was seen.
     fn count(&self, local: &[Option<Vec3>]) -> Tally {
         let mut t = Tally::default();
         let (b, Lengths { margin, ring, .. }) = (self.bounds, self.lengths);
@@ -162,7 +163,7 @@ impl Drawn<'_> {
         t
     }
 
-    /// Squares of the drawn surfaces that were seen, and all of them.
+    /// Number of squares of the drawn surfaces that were seen, and number of all their squares.
     fn covered(&self, seen: &HashSet<(i32, i32)>, inside: &dyn Fn(f64, f64) -> bool) -> (usize, usize) {
         let (b, square) = (self.bounds, self.lengths.square);
         let ((x0, y0), (x1, y1)) = (self.square(b[0], b[1]), self.square(b[2], b[3]));
@@ -181,7 +182,7 @@ impl Drawn<'_> {
 
     /// Pieces of the drawn edges at which a surface was seen to end.
     fn ended(&self, observations: &[Observation]) -> HashSet<(i32, i32, usize)> {
-        // By the drawing's own sample: a coordinate of an edge may lie between two pieces, where rounding decides.
+        // Uses the drawing's own sample: an edge may lie on the border of two pieces, where rounding decides.
         let sample = |o: &Observation| {
             let (x, y) = (o.x - o.residual * o.nx, o.y - o.residual * o.ny);
             self.edges.nearest(x, y, self.lengths.piece, |s| (s.shape, s.element) == (o.shape, o.element))
@@ -196,14 +197,14 @@ impl Drawn<'_> {
 pub struct TurnVote {
     /// Turn of the rival, degrees.
     pub rival_deg: f64,
-    /// Points where the two differ that speak for and against the pose.
+    /// Number of points that speak for the pose, among those where the two differ.
     pub votes_for: usize,
-    /// Points that speak for the rival.
+    /// Number of points that speak for the rival.
     pub votes_against: usize,
 }
 
 impl TurnVote {
-    /// Fewer votes tell nothing; a larger share of them decides.
+    /// Least number of votes for a decision, and the share of them that decides.
     const LEAST: usize = 6;
     const SHARE: f64 = 0.8;
 
@@ -215,7 +216,7 @@ impl TurnVote {
         self.votes_for as f64 / self.all().max(1) as f64
     }
 
-    /// `Some(true)`: the pose; `Some(false)`: the rival; `None`: not told.
+    /// `Some(true)`: the pose is right; `Some(false)`: the rival is; `None`: undecided.
     pub fn told(&self) -> Option<bool> {
         match self.share() {
             _ if self.all() < Self::LEAST => None,
@@ -225,7 +226,7 @@ impl TurnVote {
         }
     }
 
-    /// The gate that asks for it: too few votes, or what they say.
+    /// The gate on the turn: the number of votes if they are too few, otherwise the share for the pose.
     pub fn gate(&self) -> Gate {
         let (name, value, limit) = if self.all() < Self::LEAST {
             ("points that tell the turn", self.all() as f64, Self::LEAST as f64)
@@ -236,7 +237,7 @@ impl TurnVote {
     }
 }
 
-/// Counts, where the part and the part turned differ, the points that fit the one or the other.
+/// For each alike turn, counts the points that fit the part or the turned part, where the two differ.
 pub fn vote(
     points: &Ordered,
     drawing: &Drawing,
@@ -262,7 +263,7 @@ pub fn vote(
                         continue;
                     }
                     let on = (q.z - f.z).abs() <= gate;
-                    // A point above the surface is a thing that lies on it: no vote.
+                    // A point above the surface belongs to something that lies on it: no vote.
                     if !on && q.z > f.z {
                         continue;
                     }

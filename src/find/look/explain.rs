@@ -1,5 +1,6 @@
-//! In: the stack of looks, and the contrasts that gates judge. Out: for each calibration, and for what none holds
-//! (delay, steps), how much of the disagreement it would explain, how wrong it would be then, and what it could hide.
+//! In: the stack of scans, and the contrasts that gates judge. Out: for each calibration, and for errors that none
+//! covers (delay, steps), what share of the disagreement it would explain, how wrong it would have to be, and what it
+//! could hide.
 //! Frame and unit: the part's axes, mm, degrees; shares; the parameters' own units. docs/math.md, Second look (5) and
 //! (6).
 
@@ -7,34 +8,34 @@ use super::stack::{Gauges, Shared, Stack, singular};
 use crate::fault::Result;
 use nalgebra::{DMatrix, DVector, Matrix6, SVector};
 
-/// How much of the disagreement one calibration would explain, if it were free to be wrong, and what it could hide.
+/// How much of the disagreement one calibration would explain if it were free to be wrong, and what it could hide.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Explanation {
-    /// The calibration, or what nobody stated, e.g. "delay".
+    /// The calibration, or an error that nothing states, e.g. "delay".
     pub name: &'static str,
-    /// Share of the squared disagreement that goes away, 0 to 1.
+    /// Share of the squared disagreement that it explains, 0 to 1.
     pub share: f64,
-    /// By how much each of its numbers would have to be wrong, in its own unit.
+    /// How wrong each of its numbers would have to be, in its own unit.
     pub off_by: Vec<(&'static str, f64)>,
-    /// The same in its own sigmas (root mean square over its numbers); for what nobody states, in usual sizes of it.
+    /// The same in its own sigmas (root mean square over its numbers); for an error that nothing states, in its typical
+    /// size.
     pub off_by_sigmas: f64,
-    /// Largest error of the agreed pose, along the part's axes, that an error along one axis of its covariance alone
-    /// can make and be noticed by a gate in 95 of 100 cases only; and that error, in its own sigmas, where it moves
-    /// the part most.
+    /// Largest error of the agreed pose along the part's axes, mm, from an error along a single axis of the covariance.
+    /// That error is just large enough for a gate to detect it in 95 of 100 cases.
     pub unseen_mm: [f64; 3],
-    /// The same of the turns about the part's axes, degrees.
+    /// The same for the turns about the part's axes, degrees.
     pub unseen_deg: [f64; 3],
-    /// Size of that error in its own sigmas, where it moves the part most.
+    /// Size of that error in its own sigmas, for the axis that moves the part most.
     pub unnoticed_sigmas: f64,
 }
 
-/// Taken for "by anything", as a factor on standard deviations.
+/// Factor on standard deviations that stands for an unlimited error.
 const FREE: f64 = 1e3;
-/// How far beyond a gate's ratio an error lies that meets it in 95 of 100 cases, standard deviations.
+/// How far beyond a gate's ratio an error must lie to be detected in 95 of 100 cases, standard deviations.
 const NEARLY_ALWAYS: f64 = 1.645;
 
-/// What each of the stack's shared errors explains of the contrasts, best first, and hides from gauges that pass up
-/// to `ratio`.
+/// What each of the stack's shared errors explains of the contrasts, best first, and what it could hide from gauges
+/// that pass up to `ratio`.
 pub(in crate::find) fn explanations(
     stack: &Stack,
     gauges: &Gauges,
@@ -47,7 +48,7 @@ pub(in crate::find) fn explanations(
     let all = d.dot(&c.clone().cholesky().ok_or_else(singular)?.solve(&d));
     let mut out = Vec::new();
     for s in &stack.shared {
-        // Over errors of one sigma along the axes of its covariance.
+        // For errors of one sigma along each axis of its covariance.
         let (axes, lever) = (root(s), &s.lever * root(s));
         let shown = &rows * &lever;
         let freed = (&c + &shown * shown.transpose() * FREE.powi(2)).cholesky().ok_or_else(singular)?;
@@ -66,7 +67,7 @@ pub(in crate::find) fn explanations(
             unseen_deg: [pose[3], pose[4], pose[5]].map(f64::to_degrees),
             unnoticed_sigmas: sigmas,
         };
-        // Something with more numbers explains more by chance: two a number [akaike74].
+        // An error with more numbers explains more by chance: a penalty of two for each number [akaike74].
         out.push((all - left - 2.0 * numbers, explanation));
     }
     out.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -78,8 +79,8 @@ struct Unseen {
     sigmas: f64,
 }
 
-/// The largest motions, axis by axis of the part, by errors along single axes that no gauge shows at `noticed`
-/// standard deviations.
+/// The largest motions, axis by axis of the part, from errors along single axes of the covariance. Each error is as
+/// large as it can be before a gauge shows it at `noticed` standard deviations.
 fn unseen(
     lever: &DMatrix<f64>,
     gauges: &Gauges,
@@ -102,7 +103,7 @@ fn unseen(
     out
 }
 
-/// A square root of the covariance: columns are its axes times their sigmas; those that it knows to be zero stay zero.
+/// A square root of the covariance: its columns are the axes times their sigmas; axes of zero variance stay zero.
 fn root(s: &Shared) -> DMatrix<f64> {
     // Scaled to unit diagonal first: mm and rad differ by powers of ten.
     let n = s.covariance.nrows();

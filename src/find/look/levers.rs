@@ -1,6 +1,6 @@
-//! In: places that a rig saw, shot by shot, and how a measurement answers where they move. Out: for each calibration,
-//! and for what no calibration holds (delay, length of the robot's steps), what an error of each of its numbers does
-//! to the measurement.
+//! In: places that a rig saw, shot by shot, and how a measurement responds when they move. Out: for each calibration,
+//! and for errors that no calibration covers (delay, length of the robot's steps), what an error of each number does to
+//! the measurement.
 //! Frame and unit: base frame, mm, rad; sizes as shares, the part's axes. docs/math.md, Second look.
 
 use crate::camera::{Intrinsics, NAMES, Parameters, difference_step};
@@ -9,16 +9,16 @@ use crate::geometry::{Axis, AxisKind, Base, Camera, Plane, Ride, Rigid, Vec3};
 use crate::rig::{Covariance, HandEye, JointCovariance, Kind, Rig};
 use nalgebra::{DMatrix, Matrix6, SVector};
 
-/// Numbers of an [`Answer`].
+/// Length of an [`Answer`].
 pub const NUMBERS: usize = 9;
 
-/// What a measurement makes of displacements: shift and turn of the part, then its sizes along x and y and its shear.
-/// Where a measurement knows no sizes they are 0.
+/// Response of a measurement to displacements: shift and turn of the part, then its sizes along x and y and its shear.
+/// The sizes are 0 for a measurement without sizes.
 pub type Answer = SVector<f64, NUMBERS>;
 
-/// Names of the levers of what carries the sensor or the part.
+/// Name of the lever of the hand-eye calibration.
 pub const HAND_EYE: &str = "hand-eye";
-/// Name of the lever of calibrations that were made at once.
+/// Name of the lever of calibrations that were made jointly.
 pub const TOGETHER: &str = "calibrations together";
 /// Name of the lever of a linear axis or a turntable.
 pub const AXIS: &str = "axis";
@@ -26,29 +26,30 @@ pub const AXIS: &str = "axis";
 /// A place that was scanned.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
-    /// In the camera, on the laser plane.
+    /// Position in the camera frame, on the laser plane, mm.
     pub at: Vec3,
-    /// Where the camera stood at that shot, mm.
+    /// The camera's pose at that shot, mm.
     pub base_from_camera: Rigid<Base, Camera>,
-    /// By how much the place would be put elsewhere with the pose of the next shot, and with steps twice as long.
+    /// Displacement of the place if the next shot's pose were used, base frame, mm.
     pub late: Vec3,
-    /// The displacement with steps twice as long, base frame, mm.
+    /// Displacement of the place if the robot's steps were twice as long, base frame, mm.
     pub longer: Vec3,
 }
 
-/// What an error of one calibration does. Two looks share the error; where their levers differ, they disagree.
+/// The effect of an error of one calibration. Two scans share the error; where their levers differ, they disagree.
 #[derive(Clone, Debug)]
 pub struct Lever {
-    /// The calibration, or what is only supposed, e.g. "delay".
+    /// The calibration, or a supposed error, e.g. "delay".
     pub name: &'static str,
     /// The calibration's parameters, with units.
     pub parameters: &'static [&'static str],
-    /// [`Answer`] over an error of each parameter: shift and turn in base axes, sizes in the part's; 9 x n.
+    /// Change of the [`Answer`] with an error of each parameter: shift and turn in base axes, sizes in the part's; 9 x
+    /// n.
     pub jacobian: DMatrix<f64>,
-    /// Of the parameters; `None` where the calibration does not know it (imported values).
+    /// Covariance of the parameters; `None` where it is unknown (imported values).
     pub covariance: Option<DMatrix<f64>>,
-    /// True for what nothing was stated of: it does not enter sigmas, and may explain what looks disagree about. The
-    /// covariance is then a usual size of it.
+    /// True for an error that nothing states: it does not enter sigmas, and may explain why scans disagree. The
+    /// covariance is then a typical size of it.
     pub supposed: bool,
 }
 
@@ -65,7 +66,8 @@ impl Lever {
     }
 }
 
-/// The levers of all that a rig has, and of what it supposes. `answer` takes the displacement of each place, base axes.
+/// The levers of all calibrations of a rig, and of supposed errors. `answer` takes the displacement of each place, base
+/// axes.
 ///
 /// # Errors
 /// A rig with two axes.
@@ -107,7 +109,7 @@ pub fn levers(seen: &[Seen], rig: &Rig, answer: impl Fn(&[Vec3]) -> Answer) -> R
     Ok(out)
 }
 
-/// The lever of camera, lens, laser plane and hand-eye, calibrated at once. `None` where the rig has not all of these.
+/// The lever of camera, lens, laser plane and hand-eye, calibrated jointly. `None` where the rig lacks one of these.
 pub fn together(
     seen: &[Seen],
     rig: &Rig,
@@ -133,7 +135,7 @@ pub fn together(
                 let k = of(Kind::HandEye.parameters().0)?;
                 Box::new(move |s| by_hand_eye(s, &hand_eye, k))
             }
-            // The pointer scans nothing.
+            // The pointer does not scan.
             _ => continue,
         };
         at.push(i);
@@ -144,7 +146,7 @@ pub fn together(
     Some(Lever { name: TOGETHER, parameters: &[], jacobian, covariance, supposed: false })
 }
 
-/// The pixel stays, the camera or its lens changes: by differences.
+/// Displacement when the camera or its lens changes while the pixel stays, by finite differences.
 fn by_lens(s: &Seen, camera: &Intrinsics, plane: &Plane<Camera>, k: usize) -> Vec3 {
     let Some(pixel) = camera.pixel_from_point(&s.at) else { return Vec3::zeros() };
     let step = difference_step(k);
@@ -172,14 +174,14 @@ fn by_hand_eye(s: &Seen, hand_eye: &HandEye, k: usize) -> Vec3 {
     s.base_from_camera.rotation * (hand_eye.rotation.transpose() * moved)
 }
 
-/// Where an axis put the place that was seen at its count, against where it stood at the motion's zero.
+/// Displacement of a place by an error of the axis: at the count of its shot, relative to the motion's zero.
 fn by_axis(s: &Seen, axis: &Axis, k: usize) -> Vec3 {
-    // The cloud's frame is the axis'.
+    // The cloud's frame is the axis's frame.
     let axis_from_camera: Rigid<Ride, Camera> = Rigid::new(s.base_from_camera.rotation, s.base_from_camera.translation);
     axis.errors(axis.count_of(&axis_from_camera))[k].at(&s.base_from_camera.point(&s.at))
 }
 
-/// The ray through a pixel turns, and meets the plane elsewhere; the lens is left out.
+/// Displacement when the ray through a pixel turns and meets the plane elsewhere; lens distortion is ignored.
 fn by_camera(s: &Seen, camera: &Intrinsics, plane: &Plane<Camera>, k: usize) -> Vec3 {
     let (x, y) = (s.at.x / s.at.z, s.at.y / s.at.z);
     let turned = match k {

@@ -1,6 +1,6 @@
-//! In: the same part found from several sides, each look with its own uncertainty and the levers of what all looks
-//! share.
-//! Out: one pose from all, what the looks disagree about beside what they may, and which calibration would explain it.
+//! In: the same part found from several sides, each scan with its own uncertainty and the levers of errors that all
+//! scans share.
+//! Out: one pose from all, how far the scans disagree beyond what is expected, and which calibration would explain it.
 //! Frame and unit: base frame; differences along the part's axes, mm and degrees. docs/math.md, Second look.
 
 use super::explain::{Explanation, explanations};
@@ -14,16 +14,16 @@ use nalgebra::{DMatrix, Matrix6};
 
 pub use super::stack::{Look, Witness};
 
-/// What the looks disagree about.
+/// How the scans disagree.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Disagreement {
-    /// Number of looks that were compared.
+    /// Number of scans that were compared.
     pub looks: usize,
-    /// The two looks that disagree most, counted from 1.
+    /// The two scans that disagree most, counted from 1.
     pub between: [usize; 2],
-    /// Second less first, along the part's axes, and what all covariances make expect (one standard deviation).
+    /// Position in the second scan less that in the first, along the part's axes, mm.
     pub difference_mm: [f64; 3],
-    /// Turn of the second against the first, about the part's axes, degrees.
+    /// Turn of the second relative to the first, about the part's axes, degrees.
     pub difference_deg: [f64; 3],
     /// One standard deviation of the difference along the part's axes, mm.
     pub expected_mm: [f64; 3],
@@ -31,56 +31,55 @@ pub struct Disagreement {
     pub expected_deg: [f64; 3],
     /// The largest of the six differences over its expected value.
     pub ratio: f64,
-    /// All that should be zero together (differences, sizes, distances), as the standard deviations of one normal
-    /// variate.
+    /// All contrasts that should be zero (differences, sizes, distances), combined into one normal variate, in standard
+    /// deviations.
     pub misfit_sigmas: f64,
-    /// Largest turn about the part's normal and largest tilt against it between two looks, degrees; 0 where the
-    /// stations are not known.
+    /// Largest turn about the part's normal between two scans, degrees; 0 where the stations are unknown.
     pub turn_deg: f64,
-    /// Largest tilt against the part's normal between two looks, degrees.
+    /// Largest tilt against the part's normal between two scans, degrees; 0 where the stations are unknown.
     pub tilt_deg: f64,
-    /// Which calibration explains it best comes first; empty where none has a covariance.
+    /// The calibrations that explain the disagreement, the best first; empty where none has a covariance.
     pub explained_by: Vec<Explanation>,
-    /// The largest of what these could hide: in the part's plane, along its normal, as a turn.
+    /// The largest error that these could hide in the part's plane, mm.
     pub unseen_in_plane_mm: f64,
-    /// The largest along the part's normal, mm.
+    /// The largest error that these could hide along the part's normal, mm.
     pub unseen_height_mm: f64,
-    /// The largest turn about any of the part's axes, degrees.
+    /// The largest turn that these could hide about any of the part's axes, degrees.
     pub unseen_deg: f64,
-    /// A calibration without covariance takes part: more disagreement than expected may be its share, and what it
-    /// could hide is not known.
+    /// False where a calibration without covariance takes part. It may cause more disagreement than expected, and what
+    /// it could hide is unknown.
     pub complete: bool,
-    /// What a witness of the height says.
+    /// Result of a witness of the height.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub witness: Option<Witnessed>,
 }
 
-/// Heights that something else measured on the part, against the agreed pose.
+/// Heights on the part that something else measured, compared with the agreed pose.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Witnessed {
     /// Number of heights that were measured.
     pub places: usize,
-    /// Measured less agreed, weighted mean, and what all covariances make expect of it, mm.
+    /// Measured less agreed height, weighted mean, mm.
     pub height_mm: f64,
-    /// One standard deviation that all covariances make expect of that mean, mm.
+    /// Standard deviation of that mean, expected from all covariances, mm.
     pub expected_mm: f64,
     /// Size of the mean over its expected value.
     pub ratio: f64,
 }
 
-/// What several looks say together.
+/// The combined result of several scans.
 #[derive(Clone, Debug)]
 pub struct Agreed {
-    /// Pose of least variance over all looks, base frame, mm.
+    /// Pose of least variance over all scans, base frame, mm.
     pub base_from_part: Rigid<Base, Part>,
-    /// Over x y z rx ry rz about the part's own axes.
+    /// Covariance over x y z rx ry rz about the part's own axes, mm and rad.
     pub covariance: Matrix6<f64>,
-    /// How far the looks contradict each other.
+    /// How far the scans contradict each other.
     pub disagreement: Disagreement,
 }
 
 impl Disagreement {
-    /// The gates that several looks have to pass.
+    /// The gates that several scans have to pass.
     pub fn gates(&self, recipe: &Recipe) -> Vec<Gate> {
         let (g, bears) = (&recipe.gates, &recipe.insertion);
         let of_witness = self.witness.map(|w| Gate::most("range's ratio", w.ratio, g.max_look_ratio));
@@ -101,10 +100,10 @@ impl Disagreement {
     }
 }
 
-/// Brings two or more looks together. The pose is the one of least variance under the joint covariance, in which what
-/// the calibrations got wrong is one error seen from several sides (generalised least squares; docs/math.md, Second
-/// look). `size_sigma`: of the part's own sizes; `ratio`: up to which disagreement passes. Errors: fewer than two
-/// looks, or covariances that cannot be inverted.
+/// Combines two or more scans, or one scan and a witness. The pose is the one of least variance under the joint
+/// covariance, in which a calibration's error is one error seen from several sides (generalised least squares;
+/// docs/math.md, Second look). `size_sigma`: standard deviation of the part's own sizes; `ratio`: the largest
+/// disagreement that passes. Errors: too few scans, or covariances that cannot be inverted.
 pub fn agree(looks: &[Look], witness: Option<&Witness>, size_sigma: f64, ratio: f64) -> Result<Agreed> {
     if looks.is_empty() || (looks.len() < 2 && witness.is_none()) {
         return Err(Fault::usage(format!("{} scan given, two or more can be compared", looks.len()))
@@ -155,7 +154,7 @@ struct Pair {
 }
 
 fn worst_pair(looks: &[Look], stack: &Stack, into_part: &Matrix6<f64>) -> Pair {
-    // One look, which only a witness checks, disagrees with none.
+    // A single scan, which only a witness checks, disagrees with no other.
     let none = Pair { between: [1, 1], difference: Vector6::zeros(), expected: Vector6::zeros(), ratio: 0.0 };
     let mut worst: Option<Pair> = None;
     for i in 0..looks.len() {
@@ -174,8 +173,8 @@ fn worst_pair(looks: &[Look], stack: &Stack, into_part: &Matrix6<f64>) -> Pair {
     worst.unwrap_or(none)
 }
 
-/// chi² of all that should be zero, as a normal variate of the same probability [wilson31]; below 0 where it agrees
-/// better than the mean.
+/// chi² of all that should be zero, as a normal variate of the same probability [wilson31]; below 0 where the scans
+/// agree better than on average.
 fn misfit(stack: &Stack) -> Result<f64> {
     let rows = stack.contrasts();
     let (d, c) = (&rows * &stack.values, &rows * &stack.covariance * rows.transpose());
@@ -192,7 +191,7 @@ fn witnessed(stack: &Stack, follow: &DMatrix<f64>) -> Result<Witnessed> {
     Ok(Witnessed { places: off.len(), height_mm, expected_mm, ratio: height_mm.abs() / expected_mm })
 }
 
-/// Largest turn about the part's normal and largest tilt against it between two looks, degrees.
+/// Largest turn about the part's normal and largest tilt against it between two scans, degrees.
 fn sides(looks: &[Look]) -> (f64, f64) {
     let views: Vec<Mat3> = looks
         .iter()
@@ -215,7 +214,7 @@ pub(in crate::find) fn turn_and_tilt(r: &Mat3) -> (f64, f64) {
     (turn.to_degrees(), r[(2, 2)].clamp(-1.0, 1.0).acos().to_degrees())
 }
 
-/// The camera's motion that turns a look about the part's normal and tilts it about the part's x: base from base.
+/// The camera's motion that turns a scan about the part's normal and tilts it about the part's x: base from base.
 pub fn other_side(base_from_part: &Rigid<Base, Part>, turn_deg: f64, tilt_deg: f64) -> Rigid<Base, Base> {
     let turn = exp(&(Vec3::z() * turn_deg.to_radians()));
     let tilt = exp(&(Vec3::x() * tilt_deg.to_radians()));

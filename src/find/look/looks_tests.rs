@@ -1,5 +1,5 @@
-//! In: a rig's levers on a part seen from several sides, errors drawn or made. Out: judgement on the agreed pose, its
-//! sigma, the gate and what is said of hidden errors.
+//! In: a rig's levers on a part seen from several sides, errors drawn at random or chosen. Out: whether the agreed
+//! pose, its sigma, the gates and the statements about hidden errors hold.
 //! Frame and unit: base frame; mm, rad.
 
 use super::*;
@@ -23,7 +23,7 @@ struct Setup {
     hand_eye: Rigid<Flange, Camera>,
 }
 
-/// A part below the robot and cameras that pass over it, each turned and tilted against the first.
+/// A part below the robot, and cameras that pass over it, each turned and tilted relative to the first.
 fn setup(sides: &[(f64, f64)]) -> Setup {
     let part = Rigid::from_vectors(&Vec3::new(0.1, -0.2, 0.7), Vec3::new(350.0, 40.0, 12.0));
     let first: Rigid<Part, Camera> =
@@ -31,7 +31,7 @@ fn setup(sides: &[(f64, f64)]) -> Setup {
     let hand_eye = Rigid::from_vectors(&Vec3::new(0.02, 0.01, -1.6), Vec3::new(-46.0, 1.4, 93.6));
     let plane = Plane::<Camera>::new(Vec3::new(0.0, 0.8, 0.6), 90.0).unwrap();
     let rig = rig(plane, hand_eye);
-    // The sheet meets the part's plane at y = -8 of the first camera's place.
+    // The laser sheet meets the part's plane at y = -8 of the first camera's position.
     let stood: Vec<(u32, Rigid<Base, Camera>)> = (0..11u32)
         .map(|k| {
             (2 * k, part * Rigid::<Part, Part>::new(Mat3::identity(), Vec3::y() * (f64::from(k) * 2.0 - 2.0)) * first)
@@ -90,7 +90,7 @@ fn rig(plane: Plane<Camera>, hand_eye: Rigid<Flange, Camera>) -> Rig {
     }
 }
 
-/// Where a look finds the part: moved by errors of the calibrations and by its own.
+/// The pose at which each scan finds the part: moved by errors of the calibrations and by its own noise.
 fn found(s: &Setup, errors: &[DVector<f64>], rng: &mut rand_pcg::Pcg64) -> Vec<Rigid<Base, Part>> {
     s.looks
         .iter()
@@ -150,7 +150,7 @@ fn errors_as_stated_pass_and_the_pose_is_as_good_as_it_says() {
 #[test]
 fn a_turn_and_a_tilt_show_an_error_that_looks_from_one_side_hide() {
     let mut rng = rand_pcg::Pcg64::seed_from_u64(7);
-    // Along the stripe: along the way a delay would do the same.
+    // Along the stripe: an error along the sweep would look like a delay.
     let wrong = vec![DVector::zeros(4), DVector::from_vec(vec![0.0, 1.5, 0.0, 0.0, 0.0, 0.0])];
     let same = setup(&[(0.0, 0.0), (0.0, 0.0)]);
     let hidden = agreed(&same, &found(&same, &wrong, &mut rng)).disagreement;
@@ -161,7 +161,7 @@ fn a_turn_and_a_tilt_show_an_error_that_looks_from_one_side_hide() {
     assert!(shown.ratio > 10.0, "{shown:?}");
     assert_eq!(shown.explained_by[0].name, "hand-eye", "{:?}", shown.explained_by);
     assert!((shown.turn_deg - 180.0).abs() < 0.1 && (shown.tilt_deg - 20.0).abs() < 0.1, "{shown:?}");
-    // Along the approach a turn alone shows nothing.
+    // For an error along the approach, a turn alone shows nothing.
     let along = turned.hand_eye.rotation * turned.looks[0].base_from_camera.unwrap().rotation.transpose();
     let along = along * turned.part.rotation * Vec3::z();
     let wrong = vec![DVector::zeros(4), DVector::from_vec(vec![along.x, along.y, along.z, 0.0, 0.0, 0.0])];
@@ -170,8 +170,7 @@ fn a_turn_and_a_tilt_show_an_error_that_looks_from_one_side_hide() {
     assert!(agreed(&turned, &found(&turned, &wrong, &mut rng)).disagreement.ratio > 3.0);
 }
 
-/// Two looks cannot show a hand-eye's error along the axis of the turn between them; a third one about another axis
-/// can.
+/// Two scans cannot show a hand-eye error along the axis of the turn between them; a third scan about another axis can.
 #[test]
 fn a_third_look_shows_what_two_leave_open() {
     let mut rng = rand_pcg::Pcg64::seed_from_u64(9);
@@ -192,9 +191,9 @@ fn led() -> crate::find::insert::recipe::Recipe {
     crate::find::insert::recipe::Recipe::parse(include_str!("../../../data/recipes/led.toml")).unwrap()
 }
 
-/// An error of the laser plane's offset of 0.3 mm lifts the part and shows little between two looks; the part's sizes
-/// along the stripe, which the plane makes longer and the robot's steps do not, show it, and so does a height that
-/// something else measured.
+/// An error of 0.3 mm in the laser plane's offset lifts the part and shows little between two scans. The part's sizes
+/// along the stripe show it, because the plane lengthens them and the robot's steps do not. A height that something
+/// else measured shows it too.
 #[test]
 fn sizes_and_a_witness_of_the_height_show_what_two_looks_hide() {
     let mut rng = rand_pcg::Pcg64::seed_from_u64(11);
@@ -231,7 +230,7 @@ fn sizes_and_a_witness_of_the_height_show_what_two_looks_hide() {
     println!("{check:?}");
     assert!(check.ratio > 3.0 && sized.misfit_sigmas > alone.misfit_sigmas, "{check:?} {}", sized.misfit_sigmas);
     let plane = sized.explained_by.iter().find(|e| e.name == "laser plane").unwrap();
-    // How much is offset and how much tilt is not told where the plane's covariance has no pivot.
+    // Offset and tilt cannot be separated where the plane's covariance has no pivot.
     assert!(plane.share > 0.7, "{plane:?}");
 }
 

@@ -1,5 +1,5 @@
-//! In: one part or object seen from several sides, the rig. Out: what the looks agree on, what they disagree about,
-//! which calibration explains it and what stays unseen.
+//! In: one part or object seen from several sides, the rig. Out: what the scans agree on, what they disagree about,
+//! which calibration explains it and what stays undetected.
 //! Frame and unit: base frame, part axes; mm, degrees (docs/math.md, Second look).
 
 pub mod explain;

@@ -1,5 +1,5 @@
-//! In: the points of a scan on a part that was measured, the rig. Out: where the camera stood for some of them, and
-//! how the part's measured pose and sizes answer where points move.
+//! In: the points of a scan on a part that was measured, the rig. Out: the camera's pose for some of them, and how the
+//! part's measured pose and sizes respond when points move.
 //! Frame and unit: camera frame and base frame; answers as in `levers`; mm, rad.
 
 use super::levers::{Answer, Lever, Seen, levers, together};
@@ -14,7 +14,7 @@ use crate::geometry::{Base, Camera, Part, Rigid, Vec3};
 use crate::rig::{JointCovariance, Rig};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-/// Shots that are looked at, places in each, and the least that say how a camera stood.
+/// Number of shots that are used, number of places in each, and least number of places that a shot must have.
 const SHOTS: usize = 24;
 const PLACES: usize = 40;
 const MIN_PLACES: usize = 20;
@@ -25,12 +25,12 @@ pub struct PartSeen {
     /// The part's measured pose, mm.
     pub base_from_part: Rigid<Base, Part>,
     seen: Vec<Seen>,
-    /// Places and normals of the edges that located the part.
+    /// Position and normal (x, y, nx, ny) in the part frame of the edges that located the part.
     edges: Vec<[f64; 4]>,
 }
 
 impl PartSeen {
-    /// `None` where nobody knows where the camera stood, or where too few points lie on the part's surfaces.
+    /// `None` where the camera's pose is unknown, or where too few points lie on the part's surfaces.
     pub fn new(points: &Ordered, drawing: &Drawing, measured: &Measured, options: &MeasureOptions) -> Option<PartSeen> {
         let faces = drawing.faces();
         let local = localise(points, drawing, &measured.base_from_part, options);
@@ -51,22 +51,22 @@ impl PartSeen {
         PartSeen::of(measured.base_from_part, seen, edges)
     }
 
-    /// `edges`: x, y and normal in the part.
+    /// `edges`: x, y and normal in the part frame. `None` without places, or with fewer than four edges.
     pub fn of(base_from_part: Rigid<Base, Part>, seen: Vec<Seen>, edges: Vec<[f64; 4]>) -> Option<PartSeen> {
         (!seen.is_empty() && edges.len() >= 4).then_some(PartSeen { base_from_part, seen, edges })
     }
 
-    /// The camera over the middle of the part.
+    /// The camera's pose over the middle of the part.
     pub fn base_from_camera(&self) -> Rigid<Base, Camera> {
         middle(&self.seen, &self.base_from_part.translation).expect("places were asked for")
     }
 
-    /// The part's origin in that camera.
+    /// The part's origin in the frame of that camera.
     pub fn target(&self) -> Vec3 {
         self.base_from_camera().inverse().point(&self.base_from_part.translation)
     }
 
-    /// The direction of the stripe in the part's plane, and the one from shot to shot square to it.
+    /// The direction of the stripe in the part's plane, and the direction from shot to shot, perpendicular to it.
     pub fn scan_axes(&self) -> [SVector<f64, 2>; 2] {
         let camera = self.base_from_camera();
         let into_part = self.base_from_part.rotation.transpose();
@@ -81,7 +81,7 @@ impl PartSeen {
         [along, SVector::<f64, 2>::new(-along.y, along.x)]
     }
 
-    /// The same part where the robot is sent to look from another side.
+    /// The same part, scanned from another side.
     pub(in crate::find) fn moved(&self, motion: &Rigid<Base, Base>) -> PartSeen {
         let turned = |v: &Vec3| motion.direction(v);
         let seen = self
@@ -97,7 +97,7 @@ impl PartSeen {
         PartSeen { seen, ..self.clone() }
     }
 
-    /// What the rig's errors do to the part's pose and sizes, each calibration by itself.
+    /// The effect of the rig's errors on the part's pose and sizes, each calibration separately.
     ///
     /// # Errors
     /// A rig with two axes.
@@ -105,17 +105,17 @@ impl PartSeen {
         levers(&self.seen, rig, self.answer())
     }
 
-    /// What they do all together: camera, lens, laser plane and hand-eye were calibrated at once, and their errors
-    /// cancel in part. `None` where the rig has not all of these.
+    /// Their joint effect: camera, lens, laser plane and hand-eye were calibrated together, and their errors cancel in
+    /// part. `None` where the rig lacks one of these.
     pub fn together(&self, rig: &Rig, joint: &JointCovariance) -> Option<Lever> {
         together(&self.seen, rig, joint, self.answer())
     }
 
-    /// The part's measured pose and sizes where places move: displacements, base frame.
+    /// How the part's measured pose and sizes respond to displacements of the places, base frame.
     pub fn answer(&self) -> impl Fn(&[Vec3]) -> Answer + '_ {
         let into_part = self.base_from_part.inverse();
         let places: Vec<Vec3> = self.seen.iter().map(|s| into_part.point(&s.base_from_camera.point(&s.at))).collect();
-        // Displacements are taken to change evenly over the part: a constant and a slope along each axis.
+        // Displacements are assumed to change linearly over the part: a constant and a slope along each axis.
         let rows = DMatrix::from_fn(places.len(), 4, |r, c| if c == 0 { 1.0 } else { places[r][c - 1] });
         let even = inverted(&(rows.transpose() * &rows)) * rows.transpose();
         let edge = |shape: bool| {
@@ -153,7 +153,7 @@ pub(in crate::find) fn middle(seen: &[Seen], of: &Vec3) -> Option<Rigid<Base, Ca
 }
 
 /// How some of a scan's points, given as (row, point) in the order of rows, were seen: at most [`SHOTS`] shots and
-/// [`PLACES`] in each. Empty where nobody knows where the camera stood.
+/// [`PLACES`] in each. Empty where the camera's pose is unknown, or for fewer than two shots.
 pub(in crate::find) fn seen_by(points: &Ordered, on: impl Iterator<Item = (u32, usize)>) -> Vec<(usize, Seen)> {
     let mut shots: Vec<(u32, Vec<usize>)> = Vec::new();
     for (row, i) in on {
@@ -176,7 +176,8 @@ pub(in crate::find) fn seen_by(points: &Ordered, on: impl Iterator<Item = (u32, 
     places.iter().map(|p| p.1).zip(travel).collect()
 }
 
-/// `stood`: shot and camera; `first`: the camera of the first shot; `places`: index into `stood`, place in the camera.
+/// `stood`: shot number and camera pose; `first`: camera pose of the first shot; `places`: index into `stood`, position
+/// in the camera frame.
 pub(in crate::find) fn travelled(
     stood: &[(u32, Rigid<Base, Camera>)],
     first: &Rigid<Base, Camera>,
@@ -191,20 +192,20 @@ pub(in crate::find) fn travelled(
     places.iter().map(seen).collect()
 }
 
-/// `count` indices at most, evenly over `of`.
+/// At most `count` indices, spread evenly over `of`.
 fn strided(of: usize, count: usize) -> Vec<usize> {
     let n = of.min(count);
     (0..n).map(|i| i * of / n.max(1)).collect()
 }
 
-/// The inverse of a normal matrix; what it leaves free stays where it is.
+/// The inverse of a normal matrix; directions that it does not determine get no step.
 fn inverted(normal: &DMatrix<f64>) -> DMatrix<f64> {
     let n = normal.nrows();
     let ridge = 1e-9 * normal.trace() / n as f64;
     (normal + DMatrix::identity(n, n) * ridge.max(1e-300)).try_inverse().unwrap_or_else(|| DMatrix::zeros(n, n))
 }
 
-/// Direction towards the camera during the scan, base frame; `None` where nobody knows where it stood.
+/// Direction towards the camera during the scan, base frame; `None` where the camera's pose is unknown.
 pub fn towards_camera(points: &Ordered) -> Option<Vec3> {
     let middle = points.row[points.row.len() / 2];
     points.from_camera[middle as usize].map(|c| -c.direction(&Vec3::z()))

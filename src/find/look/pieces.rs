@@ -11,23 +11,23 @@ pub(super) struct Piece {
     pub at: Vec3,
     /// Towards the camera.
     pub normal: Vec3,
-    /// From one sample to the next, the shorter way, mm; sine of the angle between normal and sight.
+    /// Distance to the next sample in the shorter direction, mm; sine of the angle between normal and line of sight.
     pub step: f64,
     pub lean: f64,
-    /// The point in its middle, and the row of that.
+    /// The point in its middle, and the row of that point.
     pub point: usize,
     pub row: u32,
 }
 
-/// Pieces of a scan; samples to each side of one; the least of them that must be there, and how flat it is: its
-/// thickness over its width, squared.
+/// Number of pieces of a scan; samples to each side of a piece's middle; least number of samples in a piece; largest
+/// square of its thickness over its width.
 const PIECES: usize = 4000;
 const BESIDE: i64 = 3;
 const MIN_SAMPLES: usize = 24;
 const FLAT: f64 = 0.01;
-/// Pieces that face each other by less than this are not of one surface, cosine.
+/// Two pieces belong to one surface only if the cosine between their normals exceeds this.
 const FACING: f64 = 0.9;
-/// Farthest that two scans of one object lie apart, mm.
+/// Largest distance between two scans of one object, mm.
 pub(super) const FARTHEST: f64 = 5.0;
 
 pub(super) fn pieces(points: &Ordered) -> Vec<Piece> {
@@ -55,13 +55,14 @@ fn piece(points: &Ordered, i: usize) -> Option<Piece> {
     let normal: Vec3 = eigen.eigenvectors.column(order[0]).into();
     let sight = points.from_camera[points.row[i] as usize].map_or(normal, |c| (c.translation - at).normalize());
     let normal = if normal.dot(&sight) < 0.0 { -normal } else { normal };
-    // 2 BESIDE + 1 samples in a line scatter by twice their step.
+    // A line of 2 BESIDE + 1 samples scatters by twice their step.
     let step = (eigen.eigenvalues[order[1]] / around.len() as f64).sqrt() / 2.0;
     let lean = normal.cross(&sight).norm();
     Some(Piece { at, normal, step, lean, point: i, row: points.row[i] })
 }
 
-/// The first scan: some of its pieces in cells, from which the nearest of all its points is walked to.
+/// The first scan: some of its pieces, sorted into cells. A walk leads from the nearest of them to the nearest of all
+/// points.
 pub(super) struct Surface<'a> {
     points: &'a Ordered,
     pieces: &'a [Piece],
@@ -77,9 +78,10 @@ impl<'a> Surface<'a> {
         pieces.iter().enumerate().for_each(|(i, p)| cells.entry(Surface::key(&p.at)).or_default().push(i));
         Surface { points, pieces, cells }
     }
-    /// The flat piece about the nearest point within `gate` that faces as `normal`. The pieces in cells lie
-    /// millimetres apart: a plane continued so far leaves a curved surface by more than what is sought.
-    /// `among_all` false stops at the nearest of some pieces: from afar that pulls over a wider range.
+    /// The flat piece around the nearest point within `gate` that faces like `normal`. The pieces in cells lie
+    /// millimetres apart: over that distance a plane leaves a curved surface by more than the error that is sought.
+    /// With `among_all` false, the search stops at the nearest piece in the cells: from afar that attracts over a wider
+    /// range.
     pub fn nearest(&self, p: &Vec3, normal: &Vec3, gate: f64, among_all: bool) -> Option<Piece> {
         let [x, y, z] = Surface::key(p);
         let around = (-1..=1).flat_map(|a| (-1..=1).flat_map(move |b| (-1..=1).map(move |c| [x + a, y + b, z + c])));
@@ -92,7 +94,7 @@ impl<'a> Surface<'a> {
         let found = piece(self.points, self.walk(from.point, p)).filter(|q| faces(q, normal));
         Some(found.unwrap_or(*from))
     }
-    /// From a point to the nearest one, neighbour by neighbour.
+    /// Walks from a point to the nearest one, neighbour by neighbour.
     fn walk(&self, from: usize, to: &Vec3) -> usize {
         let off = |i: usize| (self.points.points[i] - to).norm_squared();
         let mut here = from;
@@ -118,8 +120,8 @@ mod tests {
     use crate::scan::{Along, CloudPoint, Shots};
     use glam::Vec3 as Point;
 
-    /// The top of a ball of 9 mm in steps of 0.02 mm: the planes of some pieces leave it, those of the nearest points
-    /// do not.
+    /// The top of a ball of 9 mm in steps of 0.02 mm: the planes of the pieces in cells leave it, those around the
+    /// nearest points do not.
     #[test]
     fn the_nearest_piece_lies_on_the_curved_surface_beside_a_place() {
         const RADIUS: f32 = 4.5;
@@ -140,7 +142,7 @@ mod tests {
             })
             .collect();
         let points = Ordered::new(&cloud, &Shots::unplaced(Along::U)).unwrap();
-        // As few as a scan a hundred times as long has for such a ball.
+        // As few pieces as a scan a hundred times as long has for such a ball.
         let some: Vec<Piece> = pieces(&points).into_iter().step_by(97).collect();
         let surface = Surface::new(&points, &some);
         let (mut all, mut few): (f64, f64) = (0.0, 0.0);

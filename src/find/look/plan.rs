@@ -1,5 +1,5 @@
-//! In: a part found in one scan, how its camera stood, the calibrations. Out: where the sensor goes for a second
-//! look, and for each number of each calibration how much of its error the two looks together can show.
+//! In: a part found in one scan, its camera's pose, the calibrations. Out: where the sensor goes for a verification
+//! scan, and what share of the error of each number of each calibration the two scans together can show.
 //! Frame and unit: base frame, mm; shares of 0 to 2. docs/math.md, Second look.
 
 use super::levers::Lever;
@@ -9,40 +9,40 @@ use crate::find::insert::locate::Report;
 use crate::geometry::{Base, Rigid};
 use crate::rig::Rig;
 
-/// What the looks can show of one number of one calibration.
+/// What the scans can show of one number of one calibration.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Shown {
-    /// Its name, see [`Lever::name`].
+    /// Name of the calibration, see [`Lever::name`].
     pub calibration: &'static str,
     /// The number, with its unit.
     pub parameter: &'static str,
-    /// Difference between the looks over the error that it makes in the pose: in place and height, mm over mm. Below
-    /// `HIDDEN` the looks cannot show it.
+    /// Difference between the scans over the error that it makes in the pose, in position and height, mm over mm. Below
+    /// `HIDDEN` the scans cannot show it.
     pub share: f64,
 }
 
-/// A second look.
+/// A planned verification scan.
 #[derive(Clone, Debug)]
 pub struct LookPlan {
-    /// The sensor's motion: every pose of the first scan is moved by it.
+    /// The sensor's motion, which is applied to every pose of the first scan.
     pub base_from_base: Rigid<Base, Base>,
-    /// One entry a number of each calibration.
+    /// One entry for each number of each calibration.
     pub shown: Vec<Shown>,
 }
 
-/// An error of which less than this shows stays hidden.
+/// An error stays hidden if less than this share of it shows.
 pub const HIDDEN: f64 = 0.3;
 
 impl LookPlan {
-    /// What the two looks leave to be shown by other means, in words.
+    /// The errors that the two scans cannot show, in words.
     pub fn hidden(&self) -> Vec<String> {
         let hidden = self.shown.iter().filter(|s| s.share < HIDDEN);
         hidden.map(|s| format!("{} {}: {:.0} % shows", s.calibration, s.parameter, 100.0 * s.share)).collect()
     }
 }
 
-/// Plans a second look: turned about the part's normal by `turn_deg` (60 to 300) and tilted about its x by `tilt_deg`
-/// (-45 to 45). Errors: numbers out of range, a scan that does not fit the rig.
+/// Plans a verification scan: turned about the part's normal by `turn_deg` (60 to 300) and tilted about its x by
+/// `tilt_deg` (10 to 45 to either side). Errors: numbers out of range, a scan that does not fit the rig.
 pub fn plan_look(report: &Report, rig: &Rig, turn_deg: f64, tilt_deg: f64) -> Result<LookPlan> {
     if !(60.0..=300.0).contains(&turn_deg) || !(10.0..=45.0).contains(&tilt_deg.abs()) {
         return Err(Fault::usage(format!(

@@ -1,5 +1,5 @@
-//! In: scans of one object that nobody drew, from several sides, the rig that took them. Out: where each scan puts
-//! the object against the first one, with covariance, and how the rig's errors move it: looks at it, as at a part.
+//! In: scans of one object without a drawing, from several sides, and the rig that took them. Out: the object's pose in
+//! each scan relative to the first, with covariance, and how the rig's errors move it, as for scans of a part.
 //! Frame and unit: base frame about the object's middle; mm, rad. docs/math.md, Registration.
 
 use super::levers::{Answer, Seen, levers};
@@ -16,26 +16,26 @@ use std::collections::{BTreeMap, HashMap};
 
 type Vector6 = SVector<f64, 6>;
 
-/// One scan of the object against the first.
+/// One scan of the object, compared with the first.
 #[derive(Clone, Debug)]
 pub struct Registered {
-    /// Base axes about the object's middle, moved by what the scan differs by.
+    /// Base axes about the object's middle, moved by how the scan differs from the first.
     pub base_from_object: Rigid<Base, Part>,
-    /// How uncertain that is, and how the rig's errors move it.
+    /// The uncertainty of that pose, and how the rig's errors move it.
     pub budget: Budget,
-    /// Share of its pieces of surface that lie on the first scan's, and their distance from it, rms, mm.
+    /// Share of its surface pieces that lie on those of the first scan.
     pub overlap: f64,
     /// Distance of these pieces from the first scan's surfaces, rms, mm.
     pub rms_mm: f64,
 }
 
-/// What a piece of the scan says against the first one's.
+/// A piece of the scan, paired with one of the first scan.
 struct Pair {
-    /// How its distance answers a step.
+    /// Derivative of its distance by a step.
     row: Vector6,
-    /// That distance, mm.
+    /// Its distance along the normal, mm.
     off: f64,
-    /// Shots of the piece and of the other one, the cell where they lie, the direction that they face.
+    /// Rows (shots) of the two pieces, the cell in which they lie, the direction in which they face.
     shots: [u32; 2],
     cell: [i32; 3],
     facing: [i32; 3],
@@ -44,30 +44,30 @@ struct Pair {
 }
 
 const MIN_MATCHED: usize = 60;
-/// A shift or turn that no surface tells is known so far, mm and rad.
+/// Prior standard deviation of a shift and a turn that no surface determines, mm and rad.
 const UNKNOWN: [f64; 2] = [5.0, 0.05];
-/// What shifts a stripe's centre along the surface's normal and does not scatter, as shares of the sampling step,
-/// standard deviations: in one place the pixels' raster; on all that leans away from the camera one way, times the
-/// lean's sine, that it bends within the light and within the samples that are fitted together (balls of 9 mm in ten
-/// scans: 0.04 to 0.06).
+/// Errors of a stripe's centre along the surface's normal that do not average out, as shares of the sampling step,
+/// standard deviations. `LEVEL_BIAS`: the pixels' raster, common to one place. `LEAN_BIAS`, times the lean's sine:
+/// common to all surfaces that lean away from the camera in one direction. It stems from curvature within the light and
+/// within the samples that are fitted together (balls of 9 mm in ten scans: 0.04 to 0.06).
 const LEVEL_BIAS: f64 = 0.01;
 const LEAN_BIAS: f64 = 0.07;
-/// Directions to a unit of a normal's length that are told apart.
+/// Number of directions that are distinguished for each unit of a normal's length.
 const FACINGS: f64 = 2.0;
-/// Rounds of one way to the optimum.
+/// Rounds of one path to the optimum.
 const ROUNDS: i32 = 25;
-/// Where the ways begin, mm in x and y: surfaces of several directions have optima beside the right one.
+/// Starts of the paths, mm in x and y: surfaces of several directions have local optima beside the right one.
 const STARTS: [[f64; 2]; 5] = [[0.0, 0.0], [2.0, 0.0], [-2.0, 0.0], [0.0, 2.0], [0.0, -2.0]];
-/// Turns about the vertical with which the best of them goes on, rad: rows of pins have optima a third of a degree to
-/// both sides.
+/// Turns about the vertical from which the best path continues, rad: rows of pins have local optima a third of a degree
+/// to both sides.
 const TURNS: [f64; 3] = [-6e-3, 0.0, 6e-3];
-/// Of the rounds, those that take the nearest of some pieces: from afar that pulls over a wider range.
+/// Number of first rounds that use only the pieces in cells: from afar these attract over a wider range.
 const COARSE: i32 = 15;
-/// Reach for a partner that the rounds end with, mm.
+/// Search distance for a partner in the last rounds, mm.
 const NEAREST: f64 = 1.5;
 const TUKEY: f64 = 4.0;
 
-/// A place with the normal along which a shift of it is seen.
+/// Derivative of a place's distance along its normal, by shift and turn about `centre`.
 fn row(at: &Vec3, normal: &Vec3, centre: &Vec3) -> Vector6 {
     let turned = (at - centre).cross(normal);
     Vector6::new(normal.x, normal.y, normal.z, turned.x, turned.y, turned.z)
@@ -91,12 +91,12 @@ fn weight(off: f64, sigma: f64) -> f64 {
     (1.0 - (off / (TUKEY * sigma)).powi(2)).max(0.0).powi(2) / (sigma * sigma)
 }
 
-/// Scatter of the scores of what belongs together [liang86].
+/// Scatter of the scores, summed within each cluster [liang86].
 fn clustered<K: Ord>(pairs: &[Pair], sigma: f64, by: impl Fn(&Pair) -> K) -> Matrix6<f64> {
     scatter(pairs, by, |p| p.row * (p.off * weight(p.off, sigma)))
 }
 
-/// Scatter of the scores that an offset of this size makes, common to what belongs together.
+/// Scatter of the scores that an offset of this size makes when it is common to each cluster.
 fn common<K: Ord>(pairs: &[Pair], sigma: f64, by: impl Fn(&Pair) -> K, offset: impl Fn(&Pair) -> f64) -> Matrix6<f64> {
     scatter(pairs, by, |p| p.row * (offset(p) * weight(p.off, sigma)))
 }
@@ -109,7 +109,7 @@ fn scatter<K: Ord>(pairs: &[Pair], by: impl Fn(&Pair) -> K, score: impl Fn(&Pair
     scores.values().map(|g| g * g.transpose()).sum()
 }
 
-/// What the pieces of a scan say where it is brought to by this step.
+/// The pairs of a scan's pieces once the scan is moved by this step.
 fn pairs(first: &Surface, moving: &[Piece], centre: &Vec3, step: &Vector6, gate: f64, among_all: bool) -> Vec<Pair> {
     let turn = exp(&Vec3::new(step[3], step[4], step[5]));
     let shift = Vec3::new(step[0], step[1], step[2]);
@@ -129,7 +129,7 @@ fn pairs(first: &Surface, moving: &[Piece], centre: &Vec3, step: &Vector6, gate:
     moving.par_iter().filter_map(pair).collect()
 }
 
-/// One way to an optimum.
+/// One path to an optimum.
 struct Way {
     step: Vector6,
     inverse: Matrix6<f64>,
@@ -137,8 +137,8 @@ struct Way {
     sigma: f64,
 }
 
-/// Brings pieces onto those of the first scan, point to plane [chen92]; what no surface tells stays where it is.
-/// `coarse` rounds take the nearest of some pieces.
+/// Brings pieces onto those of the first scan, point to plane [chen92]; directions that no surface determines stay
+/// unchanged. The first `coarse` rounds use only the pieces in cells.
 fn walk(first: &Surface, moving: &[Piece], centre: &Vec3, mut step: Vector6, coarse: i32) -> Option<Way> {
     let mut last = None;
     for round in 0..ROUNDS {
@@ -163,15 +163,15 @@ fn walk(first: &Surface, moving: &[Piece], centre: &Vec3, mut step: Vector6, coa
     last
 }
 
-/// That on which the least is left of all pieces' distances, those without a partner counted as far off, at the scale
-/// of the way that fits best.
+/// The path that leaves the least of all pieces' distances. Pieces without a partner count as far off; the scale is
+/// that of the path that fits best.
 fn best_of(ways: &[Way], pieces: usize) -> Option<usize> {
     let scale = TUKEY * ways.iter().map(|w| w.sigma).min_by(f64::total_cmp)?;
     let left = |w: &Way| pieces as f64 - w.pairs.iter().map(|p| 1.0 - (p.off / scale).powi(2).min(1.0)).sum::<f64>();
     (0..ways.len()).min_by(|&a, &b| left(&ways[a]).total_cmp(&left(&ways[b])))
 }
 
-/// The best of the ways from several starts, and from there with several turns.
+/// The best of the paths from several starts, continued from there with several turns.
 fn fit(first: &Surface, moving: &[Piece], centre: &Vec3) -> Option<Fit> {
     let start = |[x, y]: [f64; 2]| Vector6::new(x, y, 0.0, 0.0, 0.0, 0.0);
     let mut ways: Vec<Way> = STARTS.iter().filter_map(|&s| walk(first, moving, centre, start(s), COARSE)).collect();
@@ -181,8 +181,8 @@ fn fit(first: &Surface, moving: &[Piece], centre: &Vec3) -> Option<Fit> {
     ways.extend(TURNS.iter().filter_map(|&turn| walk(first, moving, centre, turned(turn), 0)));
     let way = ways.swap_remove(best_of(&ways, moving.len())?);
     let Way { step, inverse, pairs, sigma } = way;
-    // Pieces of one shot share its pose's error, in either scan; those of one place share what its slope and its
-    // edges do to a stripe's centre.
+    // Pieces of one shot share its pose's error, in either scan. Pieces of one place share the effect of its slope and
+    // its edges on a stripe's centre.
     let middle = clustered(&pairs, sigma, |p| p.shots[0])
         + clustered(&pairs, sigma, |p| p.shots[1])
         + clustered(&pairs, sigma, |p| p.cell)
@@ -193,8 +193,8 @@ fn fit(first: &Surface, moving: &[Piece], centre: &Vec3) -> Option<Fit> {
     Some(Fit { step, covariance: inverse * middle * inverse, matched: pairs.len(), rms })
 }
 
-/// Registers scans of one object, two or more, each given with what to call it. Errors: a scan that does not fit the
-/// rig, too few surfaces that both saw.
+/// Registers two or more scans of one object, each with its name. Errors: fewer than two scans, a scan that does not
+/// fit the rig, too few surfaces that both saw.
 pub fn register(scans: &[(String, Ordered)], rig: &Rig) -> Result<Vec<Registered>> {
     let weak = |what: String| {
         Fault::refused(what)
@@ -228,7 +228,7 @@ pub fn register(scans: &[(String, Ordered)], rig: &Rig) -> Result<Vec<Registered
         let budget = budget(&seen, pieces, &centre, rig, fit.covariance)?
             .ok_or_else(|| weak(format!("{name}: the scan does not state its camera's poses")))?;
         out.push(Registered {
-            // What brings the scan back is what it is off by.
+            // The scan's deviation is the inverse of the step that brings it back.
             base_from_object: Rigid::new(exp(&-turn), centre - shift),
             budget,
             overlap: fit.matched as f64 / pieces.len() as f64,
@@ -249,7 +249,7 @@ fn budget(
     let (seen, faces): (Vec<Seen>, Vec<&Piece>) = seen.iter().map(|(i, s)| (*s, normals[i])).unzip();
     let Some(base_from_camera) = middle(&seen, centre) else { return Ok(None) };
     let rows: Vec<Vector6> = faces.iter().map(|p| row(&p.at, &p.normal, centre)).collect();
-    // One piece weighs as it does in the fit, about: what no surface tells does not follow either.
+    // Each piece has about its weight in the fit: directions that no surface determines do not follow either.
     let weight = 1e4;
     let normal = rows.iter().map(|j| j * j.transpose() * weight).sum::<Matrix6<f64>>() + known();
     let Some(follow) = normal.try_inverse().map(|n| n * weight) else { return Ok(None) };

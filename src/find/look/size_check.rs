@@ -1,5 +1,5 @@
-//! In: a part's sizes as they were measured, what all calibrations make expect of them. Out: what they say along the
-//! stripe and from shot to shot, and the gate on it.
+//! In: a part's measured sizes, and what all calibrations predict. Out: their deviations along the stripe and from shot
+//! to shot, and the gate on them.
 //! Frame and unit: the scan's directions in the part's plane; percent, degrees. docs/math.md, Sizes.
 
 use super::levers::Lever;
@@ -8,28 +8,29 @@ use crate::find::insert::recipe::Gates;
 use crate::find::measure::shape::Shape;
 use nalgebra::{Matrix3, SMatrix, Vector2};
 
-/// What the sizes say against the drawing, along the stripe and across it.
+/// Deviations of the sizes from the drawing, along the stripe and across it.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct SizeCheck {
-    /// Along the stripe, from shot to shot, and what the first is longer than the second: percent.
+    /// Along the stripe, percent longer than drawn.
     pub along_percent: f64,
     /// From shot to shot, percent longer than drawn.
     pub across_percent: f64,
-    /// What the first is longer than the second, percent.
+    /// Difference of the two, along less across, percent.
     pub difference_percent: f64,
-    /// Of the angle between the two directions, degrees.
+    /// Deviation of the angle between the two directions, degrees.
     pub shear_deg: f64,
-    /// What all covariances and the part's own sizes make expect of the four: one standard deviation.
+    /// Standard deviations of the four, expected from all covariances and the scatter of the part's own sizes.
     pub expected: [f64; 4],
     /// The largest of the four over its expected value.
     pub ratio: f64,
 }
 
-/// What is said where the sizes could hide more than this, percent, three standard deviations.
+/// A note is given where the sizes could hide more than this, percent, three standard deviations.
 const TOLD_PERCENT: f64 = 1.0;
 
 impl SizeCheck {
-    /// `axes`: the stripe's direction in the part's plane and the one across it; `size_sigma`: of the part's own sizes.
+    /// `axes`: the stripe's direction in the part's plane and the one across it; `size_sigma`: standard deviation of
+    /// the part's own sizes.
     pub fn new(shape: &Shape, levers: &[Lever], axes: &[Vector2<f64>; 2], size_sigma: f64) -> SizeCheck {
         let all = expected(shape, levers, size_sigma);
         let rows = size_rows(axes);
@@ -52,7 +53,7 @@ impl SizeCheck {
         Gate::most("sizes' ratio", self.ratio, g.max_look_ratio)
     }
 
-    /// What the sizes of this part cannot show.
+    /// A note on what the sizes of this part cannot show.
     pub(in crate::find) fn silent(&self) -> Option<String> {
         let worst = self.expected[0].max(self.expected[1]);
         (3.0 * worst > TOLD_PERCENT).then(|| {
@@ -65,7 +66,8 @@ impl SizeCheck {
     }
 }
 
-/// Lengths along the stripe and across it, their difference, and shear, over the part's own three.
+/// Rows that give the lengths along the stripe and across it, their difference, and the shear, from the part's own
+/// three sizes.
 pub(in crate::find) fn size_rows(axes: &[Vector2<f64>; 2]) -> [SMatrix<f64, 1, 3>; 4] {
     let [s, c] = axes;
     let along = |d: &Vector2<f64>| SMatrix::<f64, 1, 3>::new(d.x * d.x, d.y * d.y, d.x * d.y);
@@ -73,7 +75,7 @@ pub(in crate::find) fn size_rows(axes: &[Vector2<f64>; 2]) -> [SMatrix<f64, 1, 3
     [along(s), along(c), along(s) - along(c), shear]
 }
 
-/// Covariance of the sizes under all that is stated: their own, the calibrations', the part's.
+/// Covariance of the sizes from all stated sources: the measurement, the calibrations, the part.
 pub(in crate::find) fn expected(shape: &Shape, levers: &[Lever], size_sigma: f64) -> Matrix3<f64> {
     let mut all = shape.covariance + of_part(size_sigma);
     for l in levers.iter().filter(|l| !l.supposed) {
@@ -85,7 +87,7 @@ pub(in crate::find) fn expected(shape: &Shape, levers: &[Lever], size_sigma: f64
     all
 }
 
-/// How far parts of one drawing differ in size: most of it is common to both directions.
+/// Covariance of the sizes of parts made from one drawing: most of it is common to both directions.
 pub(in crate::find) fn of_part(sigma: f64) -> Matrix3<f64> {
     let (common, each) = (sigma * sigma, (sigma / 3.0).powi(2));
     Matrix3::new(common + each, common, 0.0, common, common + each, 0.0, 0.0, 0.0, 2.0 * each)

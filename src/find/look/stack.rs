@@ -1,6 +1,6 @@
-//! In: looks at one part and what else was measured of it, each with its own covariance and the levers of what all
+//! In: scans of one part and other measurements of it, each with its own covariance and the levers of errors that all
 //! share.
-//! Out: one vector with its joint covariance, the pose of least variance, and what should be zero if all were as
+//! Out: one vector with its joint covariance, the pose of least variance, and the contrasts that are zero if all is as
 //! stated.
 //! Frame and unit: base axes, mm and rad; sizes in the part's axes. docs/math.md, Second look (1) to (3).
 
@@ -13,46 +13,46 @@ use nalgebra::{DMatrix, DVector, Matrix6, SVector};
 
 pub(in crate::find) type Vector6 = SVector<f64, 6>;
 
-/// One look at the part.
+/// One scan of the part.
 #[derive(Clone, Copy)]
 pub struct Look<'a> {
-    /// The part's pose as this look found it, mm.
+    /// The part's pose as this scan found it, mm.
     pub base_from_part: Rigid<Base, Part>,
-    /// Its uncertainty, and the levers that it shares with other looks.
+    /// Its uncertainty, and the levers that it shares with other scans.
     pub budget: &'a Budget,
 }
 
-/// Measurements that depend on the part's pose and have no say in it: what they say of it is checked.
+/// Measurements that depend on the part's pose but do not determine it: they are checked against it.
 #[derive(Clone, Debug)]
 pub struct Witness {
-    /// Measured, less what the first look's pose makes expect.
+    /// Measured values, less those predicted by the first scan's pose.
     pub values: DVector<f64>,
-    /// Covariance that belongs to them alone.
+    /// Their own covariance, which nothing shares.
     pub own: DMatrix<f64>,
     /// Change with a motion of the part (shift, turn; base axes); n x 6.
     pub by_pose: DMatrix<f64>,
-    /// Levers on them; those of a look's name share its error. Jacobians n x parameters.
+    /// Levers on them; a lever with the same name as a scan's shares its error. Jacobians n x parameters.
     pub levers: Vec<Lever>,
 }
 
-/// Motion from the first look's pose to another's: shift of the part's origin, then turn; base axes.
+/// Motion from the first scan's pose to another's: shift of the part's origin, then turn; base axes.
 pub(in crate::find) fn motion(from: &Rigid<Base, Part>, to: &Rigid<Base, Part>) -> Vector6 {
     let turn = log(&(to.rotation * from.rotation.transpose()));
     let shift = to.translation - from.translation;
     Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 
-/// What is shared: a calibration, or what nobody stated.
+/// A shared error: of a calibration, or one that nothing states.
 pub(in crate::find) struct Shared {
     pub name: &'static str,
     pub parameters: &'static [&'static str],
-    /// Over all rows of the stack.
+    /// Effect of each parameter on all rows of the stack.
     pub lever: DMatrix<f64>,
     pub covariance: DMatrix<f64>,
     pub supposed: bool,
 }
 
-/// Everything measured: six rows a look, then three a look whose sizes were measured, then the witness's.
+/// Everything measured: six rows for each scan, then three for each scan whose sizes were measured, then the witness's.
 pub(in crate::find) struct Stack {
     pub looks: usize,
     pub values: DVector<f64>,
@@ -64,9 +64,9 @@ pub(in crate::find) struct Stack {
     pub witness: std::ops::Range<usize>,
 }
 
-/// Contrasts that gates judge one by one: each is zero if all is as stated, to its standard deviation.
+/// Contrasts that gates judge one by one: if all is as stated, each is zero to within its standard deviation.
 pub(in crate::find) struct Gauges {
-    /// Over the stack's rows.
+    /// As combinations of the stack's rows.
     pub rows: DMatrix<f64>,
     pub sigmas: DVector<f64>,
 }
@@ -121,7 +121,7 @@ impl Stack {
         stack
     }
 
-    /// Levers of one name over all rows; `sized`: the looks that have rows of sizes.
+    /// Collects the levers of one name over all rows; `sized`: the scans that have rows of sizes.
     fn share(&mut self, looks: &[Look], sized: &[usize], witness: Option<&Witness>) {
         let n = self.values.len();
         let of_witness = witness.map_or(&[][..], |w| &w.levers);
@@ -145,8 +145,8 @@ impl Stack {
         }
     }
 
-    /// How the motion of least variance follows the looks' rows, 6 x all rows (sizes and witness have no say), and
-    /// its covariance.
+    /// How the motion of least variance follows from the scans' rows, 6 x all rows (sizes and witness do not
+    /// contribute), and its covariance.
     pub fn agreed(&self) -> Result<(DMatrix<f64>, Matrix6<f64>)> {
         let n = 6 * self.looks;
         let weights = self.covariance.view((0, 0), (n, n)).clone_owned().cholesky().ok_or_else(singular)?;
@@ -157,7 +157,8 @@ impl Stack {
         Ok((follow, Matrix6::from_iterator(covariance.iter().copied())))
     }
 
-    /// What is zero if all is as stated: every row less what the first look's pose makes of it. As rows over the stack.
+    /// What is zero if all is as stated: every row less its prediction from the first scan's pose, as combinations of
+    /// the stack's rows.
     pub fn contrasts(&self) -> DMatrix<f64> {
         let n = self.values.len();
         let mut d = DMatrix::zeros(n - 6, n);
@@ -168,8 +169,8 @@ impl Stack {
         d
     }
 
-    /// What gates judge: differences of any two looks along the part's axes, the sizes of each look along and across
-    /// its stripe, the witness's mean against the agreed pose.
+    /// What gates judge: differences of any two scans along the part's axes, the sizes of each scan along and across
+    /// its stripe, the witness's mean compared with the agreed pose.
     pub fn gauges(&self, looks: &[Look], into_part: &Matrix6<f64>, follow: &DMatrix<f64>) -> Result<Gauges> {
         let n = self.values.len();
         let mut rows: Vec<DVector<f64>> = Vec::new();
@@ -210,7 +211,7 @@ impl Stack {
         Ok((weighted * variance, variance))
     }
 
-    /// The witness's rows less what the agreed pose makes of them. As rows over the stack.
+    /// The witness's rows less their prediction from the agreed pose, as combinations of the stack's rows.
     pub fn witnessed(&self, follow: &DMatrix<f64>) -> DMatrix<f64> {
         let (at, m) = (self.witness.start, self.witness.len());
         let mut d = -(self.by_pose.rows(at, m) * follow);

@@ -23,7 +23,7 @@ pub enum Build {
     Intersection,
     /// A point moved by `by_mm` along and across the line or lattice `along`.
     Offset,
-    /// Place and turn of all seen elements of a named grid.
+    /// Position and turn of all seen elements of a named grid.
     Lattice,
 }
 
@@ -31,16 +31,16 @@ pub enum Build {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Construction {
-    /// By which the insertion and later constructions refer to it.
+    /// Name by which the insertion and later constructions refer to it.
     pub name: String,
     /// What is built.
     pub kind: Build,
     /// Shapes (`name`, `name[column,row]`) or earlier constructions.
     pub of: Vec<String>,
-    /// offset: along and across (a quarter turn counter-clockwise), mm.
+    /// For an offset: the shift along and across (a quarter turn counter-clockwise), mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub by_mm: Option<[f64; 2]>,
-    /// offset: the line or lattice that gives the direction.
+    /// For an offset: the line or lattice that gives the direction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub along: Option<String>,
 }
@@ -54,12 +54,12 @@ pub struct Built {
     pub measured: Value,
     /// Built from the drawing; part frame, sigma 0.
     pub nominal: Value,
-    /// Measured less nominal, mm, and the same of the direction, degrees.
+    /// Measured less nominal position, mm.
     pub deviation_mm: [f64; 2],
     /// Measured less nominal direction, degrees, -180 to 180; `None` for a bare point.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deviation_deg: Option<f64>,
-    /// How many measured shapes went in.
+    /// Number of measured shapes that were used.
     pub shapes: usize,
 }
 
@@ -72,17 +72,17 @@ pub struct Feature {
     pub sigma: f64,
 }
 
-/// A shape needs so many edges in each of two directions to be measured by itself.
+/// Least number of edges in each of two directions for a shape to be measured separately.
 const MIN_EDGES: usize = 2;
 
-/// Measures every element of every named closed shape that is seen well enough, by least squares on its
-/// own edges with the surface growth that the whole part showed.
+/// Measures every element of every named closed shape that is seen well enough: by least squares on its own edges, less
+/// the surface growth of the whole part.
 pub fn features(
     observations: &[Observation],
     growth: [f64; 2],
     options: &MeasureOptions,
 ) -> BTreeMap<(usize, usize), Feature> {
-    // An end is not known better, whatever its few neighbours say.
+    // Least standard deviation of an end, even where its few neighbours agree better.
     let least = 0.03 * options.unit();
     let mut groups: BTreeMap<(usize, usize), Vec<&Observation>> = BTreeMap::new();
     for o in observations.iter().filter(|o| o.weight > 0.0) {
@@ -100,7 +100,7 @@ pub fn features(
             a += n * n.transpose();
             b += n * (o.residual - growth[o.axis]);
         }
-        // Edges of one side only leave the offset across them open.
+        // Edges with parallel normals do not determine the offset along them.
         let eigen = a.symmetric_eigenvalues();
         if eigen.min() < 0.1 * eigen.max() {
             continue;
@@ -114,7 +114,7 @@ pub fn features(
     out
 }
 
-/// Constructions as the drawing has them: measured and nominal are the same.
+/// The constructions evaluated on the drawing: measured and nominal are the same.
 ///
 /// # Errors
 /// One that refers to nothing, has too few inputs, or cannot be built.
@@ -136,7 +136,7 @@ pub fn check(list: &[Construction], drawing: &Drawing) -> Result<()> {
     nominal(list, drawing).map(|_| ())
 }
 
-/// Evaluates the constructions on measured shapes, in their order.
+/// Evaluates the constructions on measured shapes, in their order. Refuses one that cannot be built.
 pub fn build(
     list: &[Construction],
     drawing: &Drawing,
@@ -151,7 +151,7 @@ pub fn build(
     Ok(out)
 }
 
-/// Measured, nominal, and how many shapes went in.
+/// Measured value, nominal value, and number of shapes that were used.
 type Pair = (Value, Value, usize);
 
 fn one(
@@ -293,20 +293,20 @@ fn lattice(
     Ok((value, nominal, used))
 }
 
-/// How a grid lies as a whole: its place and turn against the drawing.
+/// How a grid lies as a whole: its position and turn relative to the drawing.
 struct Moved {
     /// Along the part's x and y, mm; turn about its origin, rad.
     step: Vector3<f64>,
-    /// Covariance of it for elements that scatter by 1 mm.
+    /// Covariance of `step` for elements that scatter by 1 mm.
     inverse: Matrix3<f64>,
-    /// What elements scatter by, mm.
+    /// Scatter of the elements, mm.
     sigma: f64,
     used: usize,
 }
 
 /// Least squares on elements at their nominal places, in two rounds.
 fn moved_by(seen: &[([f64; 2], Feature)], options: &MeasureOptions) -> Moved {
-    // The second without elements that lie 3 robust sigmas off.
+    // The second round excludes elements that lie 3 robust sigmas off.
     let (mut t, mut inverse, mut limit) = (Vector3::zeros(), Matrix3::zeros(), f64::MAX);
     let mut used = seen.len();
     for _ in 0..2 {

@@ -14,9 +14,9 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Fewer points do not give a datum.
 const MIN_SURFACE: usize = 60;
-/// One point in so many, those farthest from an edge, is kept however far the light reaches.
+/// One point in this many, those farthest from an edge, is always used, however far the light reaches.
 const INNERMOST: usize = 3;
-/// Nothing reaches farther along a surface, units of length.
+/// Largest distance that light reaches along a surface, in units of the recipe.
 const FARTHEST: f64 = 6.0;
 
 pub(in crate::find) struct Datum {
@@ -26,8 +26,8 @@ pub(in crate::find) struct Datum {
     pub sigma: f64,
 }
 
-/// A level start laid onto the part's faces. A long part rises by more than any gate from end to end at a degree of
-/// tilt: what lies at its ends can be told only afterwards. As it was where too few points lie on the faces.
+/// Lays a level start onto the part's faces. At a degree of tilt, a long part rises from end to end by more than any
+/// gate, so the points at its ends are recognised only in later rounds. Stops where too few points lie on the faces.
 pub(in crate::find) fn laid(
     points: &Ordered,
     drawing: &Drawing,
@@ -62,8 +62,8 @@ pub(in crate::find) fn fit_datum(
     round: usize,
 ) -> Result<Datum> {
     let gate = if round == 0 { 4.0 * options.height_gate_mm } else { 2.0 * options.height_gate_mm };
-    // Of a point that is nearer to an edge than its light reaches some comes from beside the face: its centre is off,
-    // up at one end of the stripe and down at the other.
+    // If a point is nearer to an edge than its light reaches, some of that light comes from beside the face. Its centre
+    // is then off, up at one end of the stripe and down at the other.
     let reach = points.reach_mm.min(FARTHEST * options.unit()).max(options.margin_mm);
     let mut inside: Vec<(Vector3<f64>, f64, u32)> = Vec::new();
     let mut from_edge = Vec::new();
@@ -81,7 +81,7 @@ pub(in crate::find) fn fit_datum(
     }
     let mut farthest = from_edge.clone();
     farthest.sort_unstable_by(|a, b| b.total_cmp(a));
-    // On narrow faces what lies farthest inside.
+    // On narrow faces, the points farthest inside are used.
     let kept = (farthest.len() / INNERMOST).max(MIN_SURFACE);
     let margin = farthest.get(kept).map_or(0.0, |d| d.min(reach));
     let rows: Vec<_> = inside.into_iter().zip(from_edge).filter(|(_, d)| *d >= margin).map(|(row, _)| row).collect();
@@ -110,9 +110,9 @@ mod tests {
     use crate::scan::{Along, CloudPoint, Shots};
     use rand::{Rng, SeedableRng};
 
-    /// A level plate of 24 x 16 mm in steps of 0.2 mm, its stripe slanted by `lean`: its light reaches 1.5 mm, and so
-    /// near to the plate's two ends along the stripe half of a profile is of what lies beside it. The centre is off
-    /// by up to 0.1 mm, up at one end, down at the other.
+    /// A level plate of 24 x 16 mm in steps of 0.2 mm, with a stripe slanted by `lean`. The light reaches 1.5 mm: that
+    /// near to the plate's two ends along the stripe, up to half of a profile comes from what lies beside it. The
+    /// centre is off by up to 0.1 mm, up at one end, down at the other.
     fn plate(lean: f32, stripe_px: Option<f32>) -> Ordered {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(3);
         let mut cloud = Vec::new();
@@ -138,7 +138,8 @@ mod tests {
             let local = localise(points, &drawing, &Rigid::identity(), &options);
             fit_datum(points, &local, &faces, &edges, &options, 3).unwrap().step.z.abs()
         };
-        // Two widths and half as much again: 3 px of 0.2 mm, of a step that is longer by the slant.
+        // Two stripe widths of 2.8 px, half as much again for the slant, in pixels of 0.2 mm over the length of a
+        // slanted step.
         let known = plate(0.5, Some(2.8));
         assert!((known.reach_mm - 2.0 * 1.5 * 2.8 * 0.2 / 1.25f64.sqrt()).abs() < 0.02, "{}", known.reach_mm);
         let [with, without] = [tilt(&known), tilt(&plate(0.5, None))];

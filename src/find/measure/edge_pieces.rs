@@ -1,5 +1,5 @@
 //! In: rows of light beside edges, each from a shot and a piece of an edge. Out: the step that explains them, and its
-//! covariance with what samples have in common: their shot's pose and their piece of edge (docs/math.md, Insertion
+//! covariance with the errors that samples share: their shot's pose and their piece of edge (docs/math.md, Insertion
 //! (4)).
 //! Frame and unit: as `lit_edges`; light as a share, mm, rad.
 
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 type Square = SMatrix<f64, N, N>;
 
-/// One sample: light less predicted light, and its derivative by the unknowns.
+/// One sample: measured less predicted light, and its derivative by the unknowns.
 pub(in crate::find) struct Row {
     pub j: Unknowns,
     pub residual: f64,
@@ -26,14 +26,14 @@ pub(in crate::find) struct Solved {
     pub sigma: f64,
 }
 
-/// Residuals beyond so many robust sigmas have no weight.
+/// Residuals beyond this many robust sigmas have no weight.
 const TUKEY: f64 = 4.0;
-/// How many pieces' worth of evidence the prior of the pieces' offsets weighs.
+/// Weight of the prior on the pieces' offsets, in pieces.
 const PRIOR_PIECES: f64 = 8.0;
 /// Expectation-maximisation rounds for the size of the offsets.
 const ROUNDS: usize = 15;
 
-/// What a piece adds to the normal equations: its offset is an unknown of its own, eliminated at once.
+/// The contribution of a piece to the normal equations: its offset is a separate unknown, eliminated at once.
 struct Piece {
     cross: Unknowns,
     own: f64,
@@ -41,8 +41,8 @@ struct Piece {
     rows: Vec<usize>,
 }
 
-/// Solves for the step from `x`. `bias`: expected size of a piece's offset, mm; `scatter`: of a shot's position, mm;
-/// `unit`: the recipe's unit of length, mm.
+/// Solves for the step from `x`. `bias`: expected size of a piece's offset, mm; `scatter`: standard deviation of a
+/// shot's position, mm; `unit`: the recipe's unit of length, mm.
 pub(in crate::find) fn solve(
     rows: &[Row],
     x: &Unknowns,
@@ -84,7 +84,7 @@ pub(in crate::find) fn solve(
     Some(Solved { step, covariance, sigma })
 }
 
-/// Normal matrix and right side of the priors and all rows, and what each piece takes from them.
+/// Normal matrix and right side of the priors and all rows, and the terms that each piece subtracts from them.
 fn gathered(rows: &[Row], weights: &[f64], x: &Unknowns, priors: &[Prior]) -> (Square, Unknowns, Vec<Piece>) {
     let (mut a, mut b) = (Square::zeros(), Unknowns::zeros());
     for &(k, mean, sd) in priors {
@@ -109,7 +109,7 @@ fn gathered(rows: &[Row], weights: &[f64], x: &Unknowns, priors: &[Prior]) -> (S
     (a, b, pieces.into_values().collect())
 }
 
-/// The inverse, scaled to unit diagonal first; `None` where a motion is free.
+/// The inverse, scaled to unit diagonal first; `None` where a motion is undetermined.
 fn inverted(a: &Square) -> Option<Square> {
     let scale = Unknowns::from_fn(|k, _| a[(k, k)].max(1e-300).sqrt().recip());
     let unit = Square::from_fn(|i, k| a[(i, k)] * scale[i] * scale[k]);
@@ -121,8 +121,8 @@ fn inverted(a: &Square) -> Option<Square> {
     Some(Square::from_fn(|i, k| inverse[(i, k)] * scale[i] * scale[k]))
 }
 
-/// Offsets of the pieces, plus the larger of two accounts of noise and poses: what the residuals of whole shots show
-/// when each is left out in turn, and the samples' own noise with the poses' scatter.
+/// Covariance: offsets of the pieces, plus the larger of two estimates of noise and poses. One comes from the residuals
+/// of whole shots, each excluded in turn; the other from the samples' own noise and the poses' scatter.
 #[allow(clippy::too_many_arguments)]
 fn spread(
     rows: &[Row],
@@ -172,11 +172,11 @@ fn spread(
     inverse * offsets * inverse + Square::from_fn(|i, k| known[(i, k)] * grow[i] * grow[k])
 }
 
-/// Unknowns: x, y, turn, growth along the stripe and from shot to shot, width of the light's fall there, sizes
-/// ([`super::shape::Shape`]).
+/// Unknowns: x, y, turn, growth along the stripe and from shot to shot, width of the light's fall in these two
+/// directions, sizes ([`super::shape::Shape`]).
 pub(in crate::find) const N: usize = 10;
 
 pub(in crate::find) type Unknowns = SVector<f64, N>;
 
-/// An unknown, the mean and the standard deviation that it is expected with.
+/// Index of an unknown, its expected mean and its standard deviation.
 pub(in crate::find) type Prior = (usize, f64, f64);

@@ -9,10 +9,10 @@ use crate::fault::{Fault, Result};
 use nalgebra::{Matrix3, SVector, Vector3};
 use std::collections::BTreeMap;
 
-/// Fewer ends do not give a place.
+/// Fewer ends do not determine a position.
 const MIN_EDGES: usize = 40;
-/// Standard deviation of where between two shots an edge is put, as a share of the step: the light of
-/// partly lit samples tells it to about half of what a uniform phase (0.29) would leave.
+/// Standard deviation of an edge's position between two shots, as a share of the step. The light of partly lit samples
+/// reduces it to about half of that of a uniform phase (0.29).
 const PHASE: f64 = 0.15;
 /// Prior standard deviation of the growth of surfaces, in the recipe's unit of about 1 mm: half a laser line.
 const GROWTH_PRIOR: f64 = 0.05;
@@ -56,7 +56,7 @@ pub(in crate::find) fn fit_edges(
     if let Some(whole_shots) = of_whole_shots(&observations, PHASE * step[1]) {
         covariance += whole_shots;
     }
-    // What all edges of a kind have in common shifts the part as a whole.
+    // An error that all edges of a kind share shifts the part as a whole.
     let bias = options.edge_bias * step[0].max(step[1]);
     covariance[(0, 0)] += bias * bias;
     covariance[(1, 1)] += bias * bias;
@@ -73,7 +73,7 @@ pub(in crate::find) fn fit_edges(
     })
 }
 
-/// How a residual follows place, turn and the growth along its axis; with its shot.
+/// Derivative of a residual by place, turn and the growth along its axis; the residual; its shot.
 fn row(o: &Observation) -> (SVector<f64, 5>, f64, u32) {
     let mut j = SVector::<f64, 5>::zeros();
     j[0] = o.nx;
@@ -83,11 +83,11 @@ fn row(o: &Observation) -> (SVector<f64, 5>, f64, u32) {
     (j, o.residual, o.row)
 }
 
-/// What the covariance gains because a shot's place against an edge is known to `phase` only, mm.
+/// What is added to the covariance because a shot's position relative to an edge is known only to `phase`, mm.
 fn of_whole_shots(observations: &[Observation], phase: f64) -> Option<Matrix3<f64>> {
-    // From shot to shot an edge that runs along the stripe is seen by one or two shots only, and all its
-    // samples share the place of those shots against it: one measurement each, however many columns.
-    // In order, so that the same scan gives the same sums to the last bit.
+    // From shot to shot, an edge along the stripe is seen by only one or two shots. All its samples share the position
+    // of those shots relative to it: one measurement each, however many columns. The order is fixed, so that the same
+    // scan gives the same sums to the last bit.
     let mut shared: BTreeMap<(u32, bool), Vector3<f64>> = BTreeMap::new();
     let mut normal = Matrix3::zeros();
     for o in observations.iter().filter(|o| o.locates && o.weight > 0.0) {

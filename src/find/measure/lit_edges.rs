@@ -1,5 +1,5 @@
-//! In: the points of a scan near a part whose pose is known to some tenths of a millimetre. Out: its place and turn
-//! from how much of the sheet's light each sample beside an edge still sends back (docs/math.md, Insertion (3) and
+//! In: the points of a scan near a part whose pose is known to some tenths of a millimetre. Out: its place and turn,
+//! from the share of the sheet's light that each sample beside an edge still returns (docs/math.md, Insertion (3) and
 //! (4)).
 //! Frame and unit: a correction in the part frame: x y mm, turn about z rad; light as a share of a fully lit sample's.
 
@@ -14,11 +14,12 @@ use crate::find::model::face::Face;
 use crate::geometry::{Base, Camera, Part, Rigid, Vec3};
 use nalgebra::{Matrix3, Rotation2, Vector2, Vector3};
 
-/// Prior mean and standard deviation of growth and width, in the recipe's unit of about 1 mm, as are the lengths
-/// below: optics blur a stripe's end by about a pixel, a line laser is about a tenth of a millimetre wide; both are
+/// Prior mean and standard deviation of growth and width, in the recipe's unit of about 1 mm, like the lengths below.
+/// Optics blur a stripe's end by about a pixel, and a laser line is about a tenth of a millimetre wide. Both are
 /// measured where edges are sharp.
 const PRIORS: [Prior; 4] = [(3, 0.0, 0.05), (4, 0.0, 0.05), (5, 0.25, 0.15), (6, 0.12, 0.08)];
-/// Sizes are the drawing's where the part is placed, and are all but free where they are measured.
+/// Prior standard deviations of the sizes: fixed to the drawing where the part is placed, nearly free where they are
+/// measured.
 const DRAWN: f64 = 1e-9;
 const FREE: f64 = 0.1;
 
@@ -26,29 +27,31 @@ fn priors(unit: f64, sizes: f64) -> Vec<Prior> {
     let known = PRIORS.map(|(k, mean, sd)| (k, mean * unit, sd * unit));
     known.into_iter().chain((7..N).map(|k| (k, 0.0, sizes))).collect()
 }
-/// Least width of the fall: a sharper one would make single samples decide.
+/// Least width of the fall: with a sharper one, single samples would decide.
 const SHARPEST: f64 = 0.03;
-/// A sample this far inside an edge is fully lit, and so near to it at most may it be to measure the edge.
+/// A sample this far inside an edge is fully lit; the largest distance from an edge at which a sample measures it.
 const DEEP: f64 = 0.6;
 const NEAR: f64 = 0.8;
-/// Edges farther away than this take no light.
+/// Edges farther away than this do not reduce a sample's light.
 const BEYOND: f64 = 1.0;
-/// Fully lit samples around a partly lit one, within the first of these distances that holds enough, give its full
-/// light: between a row of pins and an edge none are near.
+/// The full light of a partly lit sample comes from fully lit samples around it, within the first of these distances
+/// that holds enough. Between a row of pins and an edge, none are near.
 const AROUND: [f64; 4] = [1.6, 3.2, 6.4, 12.8];
 const MIN_FULL: usize = 6;
-/// A second edge at least so many widths away dims a sample a little, which is predicted; a nearer one decides it.
+/// A second edge at least this many widths away dims a sample slightly, which is predicted; with a nearer one, the
+/// sample is skipped.
 const APART: f64 = 1.5;
-/// Samples lit by less than half may show another surface's light; more than 2.5 widths inside none is missing.
+/// Range of use, in widths inside the edge. A sample lit by less than half may show another surface's light; more than
+/// 2.5 widths inside, no light is missing.
 const USED: [f64; 2] = [0.0, 2.5];
 const MIN_SAMPLES: usize = 60;
 const ROUNDS: usize = 6;
-/// Shots whose height noise shows how far the robot's reported poses scatter; and the share of it that is added for the
-/// scatter of its turns, which act over the length of the tool and show in the plane only.
+/// Least number of shots, and of points in each, for the scatter of the robot's reported poses from height noise. The
+/// factor accounts for the scatter of its turns, which act over the length of the tool and show in the plane only.
 const MIN_SHOTS: usize = 8;
 const TURNS_TOO: f64 = 1.4;
 
-/// The place, turn and, where they are asked for, sizes that the lit samples say.
+/// The place, turn and, if requested, sizes that the light of the samples gives.
 pub(in crate::find) struct Lit {
     /// Correction x, y, turn.
     pub step: Vector3<f64>,
@@ -61,14 +64,14 @@ pub(in crate::find) struct Lit {
 
 struct Sample {
     at: Vector2<f64>,
-    /// Of the stripe, and from shot to shot, at this shot.
+    /// Directions along the stripe and from shot to shot, at this shot.
     directions: [Vector2<f64>; 2],
     light: f64,
     row: u32,
     z: f64,
 }
 
-/// Fits the unknowns from a start; with the samples used in the last round.
+/// Fits the unknowns from a start; returns also the number of samples used in the last round.
 fn settle(
     samples: &[Sample],
     edges: &EdgeIndex,
@@ -93,7 +96,7 @@ fn settle(
 }
 
 /// Fits the light of the samples beside locating edges; `None` where too few are seen. With `shape` the part's sizes
-/// are unknown too, and start there.
+/// are unknowns too, and start from it.
 pub(in crate::find) fn fit_light(
     points: &Ordered,
     pose: &Rigid<Base, Part>,
@@ -123,7 +126,7 @@ pub(in crate::find) fn fit_light(
         let Some(full) = full_light(points, local, &deep, &on, i, [along.norm(), across.norm()], unit) else {
             continue;
         };
-        // Where the middle of the sheet meets the surface: the middle of a cut spot lies off the sheet's.
+        // Where the middle of the sheet meets the surface: the middle of a cut-off spot is not the middle of the sheet.
         let (row, turn) = (points.row[i], turns[points.row[i] as usize]);
         let at = Vector2::new(q.x, q.y) + turn * slant * (q.z - z);
         let directions = [turn * along.normalize(), turn * across.normalize()];
@@ -150,9 +153,8 @@ fn face_of(q: &Vec3, faces: &[Face], gate: f64) -> Option<f64> {
     faces.iter().map(|f| f.z).find(|z| (q.z - z).abs() <= gate)
 }
 
-/// By how much each row's shot was turned about the part's normal against the shot that saw its middle: on a
-/// turntable the stripe crosses a part in another direction at every place. None where nobody knows where the camera
-/// stood.
+/// How far each row's shot is turned about the part's normal relative to the shot that saw the part's middle: on a
+/// turntable the stripe crosses a part in another direction at every place. No turn where the camera's pose is unknown.
 fn turns(points: &Ordered, local: &[Option<Vec3>], pose: &Rigid<Base, Part>) -> Vec<Rotation2<f64>> {
     let on: Vec<u32> = (0..local.len()).filter(|&i| local[i].is_some()).map(|i| points.row[i]).collect();
     let middle = on.get(on.len() / 2).and_then(|row| points.from_camera[*row as usize]);
@@ -165,8 +167,8 @@ fn turns(points: &Ordered, local: &[Option<Vec3>], pose: &Rigid<Base, Part>) -> 
     points.from_camera.iter().map(turn).collect()
 }
 
-/// The usual steps between neighbouring samples along the stripe and from shot to shot, in the part's plane as the
-/// shot that saw its middle has them.
+/// The median steps between neighbouring samples along the stripe and from shot to shot, in the part's plane, in the
+/// directions of the shot that saw its middle.
 fn sampling(
     points: &Ordered,
     local: &[Option<Vec3>],
@@ -188,8 +190,8 @@ fn sampling(
     Some([step(0, 1)?, step(1, 0)?])
 }
 
-/// How far the sheet moves in the part's plane for a millimetre of height, from the points of the shots themselves,
-/// which lie in it, as the shot that saw the part's middle has it; zero where they all lie on one line.
+/// How far the sheet moves in the part's plane for a millimetre of height, in the directions of the shot that saw the
+/// part's middle. It is derived from the shots' points, which lie in the sheet; zero where they all lie on one line.
 fn slant(points: &Ordered, local: &[Option<Vec3>], turns: &[Rotation2<f64>], unit: f64) -> Vector2<f64> {
     let mut rows = std::collections::BTreeMap::<u32, Vec<Vec3>>::new();
     for (q, row) in local.iter().zip(&points.row) {
@@ -209,12 +211,12 @@ fn slant(points: &Ordered, local: &[Option<Vec3>], turns: &[Rotation2<f64>], uni
     order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
     let normal = eigen.eigenvectors.column(order[0]);
     let flat = Vector2::new(normal.x, normal.y);
-    // 0.3 units of height differences, and a sheet that is not parallel to the surface.
+    // Needs 0.3 units of height differences, and a sheet that is not parallel to the surface.
     let told = n > 0.0 && (eigen.eigenvalues[order[1]] / n).sqrt() > 0.3 * unit && flat.norm() > 0.1;
     if told { flat * (normal.z / flat.norm_squared()) } else { Vector2::zeros() }
 }
 
-/// Mean light of the fully lit samples around one.
+/// Mean light of the fully lit samples around a sample.
 fn full_light(
     points: &Ordered,
     local: &[Option<Vec3>],
@@ -227,7 +229,7 @@ fn full_light(
     let q = local[i]?;
     for around in AROUND.map(|a| a * unit) {
         let reach = step.map(|s| (around / s).ceil().min(80.0) as i64);
-        // A few hundred places are enough.
+        // A few hundred samples are enough.
         let stride = reach.map(|r| (r / 8).max(1) as usize);
         let (mut sum, mut n) = (0.0, 0usize);
         for dr in (-reach[1]..=reach[1]).step_by(stride[1]) {
@@ -247,7 +249,7 @@ fn full_light(
     None
 }
 
-/// Standard deviation of the shots' heights beyond what their points' noise explains: the poses' own, mm.
+/// Standard deviation of the shots' heights beyond their points' noise: the scatter of the poses, mm.
 fn pose_scatter(points: &Ordered, local: &[Option<Vec3>], deep: &[bool], on: &[Option<f64>]) -> f64 {
     let mut shots = std::collections::BTreeMap::<u32, Vec<f64>>::new();
     for i in (0..deep.len()).filter(|&i| deep[i]) {
@@ -260,7 +262,7 @@ fn pose_scatter(points: &Ordered, local: &[Option<Vec3>], deep: &[bool], on: &[O
         let n = list.len() as f64;
         let mean = list.iter().sum::<f64>() / n;
         means.push(mean.abs());
-        // The stripe is smoothed along itself: about three neighbours share one noise.
+        // The stripe is smoothed along itself: about three neighbours share one noise value.
         noise.push(list.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / n / (n / 3.0));
     }
     if means.len() < MIN_SHOTS {
@@ -270,13 +272,13 @@ fn pose_scatter(points: &Ordered, local: &[Option<Vec3>], deep: &[bool], on: &[O
     (all * all - own).max(0.0).sqrt()
 }
 
-/// The light that a sample should send back, its derivatives, and which piece of which edge it measures.
+/// The predicted light of a sample, its derivatives, and which piece of which edge it measures.
 fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns) -> Option<Row> {
     let directions = &s.directions;
     let (sin, cos) = x[2].sin_cos();
     let (dx, dy) = (s.at.x - x[0], s.at.y - x[1]);
     let (px, py) = (cos * dx + sin * dy, cos * dy - sin * dx);
-    // Where the drawing has what lies there on a part of these sizes.
+    // The place in the drawing that corresponds to this one on a part of these sizes.
     let (px, py) = (px - x[7] * px - 0.5 * x[9] * py, py - x[8] * py - 0.5 * x[9] * px);
     let edge = edges.nearest_locating(px, py, NEAR * edges.unit(), s.z)?;
     let EdgeSample { nx, ny, .. } = *edge;
@@ -284,7 +286,7 @@ fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns) -> Option<Row> {
     if !(USED[0]..USED[1]).contains(&t) {
         return None;
     }
-    // A round edge turns away by itself.
+    // A curved edge's normal changes along it: its own samples are not a second edge.
     let same = |o: &EdgeSample| (o.shape, o.element) == (edge.shape, edge.element) && o.curvature != 0.0;
     let other = edges.nearest(px, py, BEYOND * edges.unit(), |o| o.z == s.z && o.nx * nx + o.ny * ny < 0.8 && !same(o));
     let spared = match other.map(|o| widths_inside(o, px, py, x, directions).0) {
@@ -308,9 +310,9 @@ fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns) -> Option<Row> {
     Some(Row { j, residual: s.light - lit, shot: s.row, slope, normal: [nx, ny], piece: edges.piece(edge, px, py) })
 }
 
-/// How many widths of the light's fall a place lies inside an edge, the shares of the two directions in its normal,
-/// and that width in mm. The light falls off along a curved edge as well: a disc is lit by less, a hole's rim by more
-/// than a straight edge.
+/// Distance of a place inside an edge in widths of the light's fall, the shares of the two directions in its normal,
+/// and that width in mm. The light falls off along a curved edge as well: a disc's rim is lit less, and a hole's rim
+/// more, than a straight edge.
 fn widths_inside(
     edge: &EdgeSample,
     px: f64,
@@ -326,10 +328,10 @@ fn widths_inside(
     ((inside + x[3] * share[0] + x[4] * share[1]) / width, share, width)
 }
 
-/// Share of a Gaussian sheet that still falls on the surface when its middle is `t` widths inside, and its derivative.
+/// Share of a Gaussian sheet that falls on the surface when its middle is `t` widths inside, and its derivative.
 fn fall(t: f64) -> (f64, f64) {
     let density = (-0.5 * t * t).exp() / (2.0 * std::f64::consts::PI).sqrt();
-    // Abramowitz and Stegun 26.2.17: 7.5e-8.
+    // Abramowitz and Stegun 26.2.17: error below 7.5e-8.
     let k = 1.0 / (1.0 + 0.231_641_9 * t.abs());
     let poly =
         k * (0.319_381_53 + k * (-0.356_563_782 + k * (1.781_477_937 + k * (-1.821_255_978 + k * 1.330_274_429))));

@@ -9,15 +9,15 @@ use crate::fault::{Fault, Result};
 pub struct MeasureOptions {
     /// A point nearer than this to a face's height lies on that face, mm, 0.0001 to 100.
     pub height_gate_mm: f64,
-    /// An end of a surface this far from the drawn edge is still taken for that edge, mm, 0.0001 to 100.
+    /// Largest distance from a drawn edge at which an end of a surface is assigned to it, mm, 0.0001 to 100.
     pub edge_gate_mm: f64,
-    /// Points nearer than this to an edge do not vote on height and tilt, mm, 0.0001 to 100.
+    /// Points nearer than this to an edge are excluded from the fit of height and tilt, mm, 0.0001 to 100.
     pub margin_mm: f64,
-    /// Standard deviation of what a piece of an edge has in common and the model of partly lit samples does not
-    /// explain (a wall that shows, a chamfer, the pixels' raster), as a share of the sampling step, 0 to 0.5.
+    /// Standard deviation of the error that a piece of an edge shares, as a share of the sampling step, 0 to 0.5. It
+    /// covers what the model of partly lit samples does not explain: a wall that shows, a chamfer, the pixels' raster.
     pub edge_bias: f64,
-    /// Standard deviation of a part's sizes against the drawing, all of them together, as a share, 0 to 0.1; a third
-    /// of it is how far one direction differs from the other.
+    /// Standard deviation of a part's sizes relative to the drawing, common to all of them, as a share, 0 to 0.1. One
+    /// direction differs from the other by a third of it.
     pub size_sigma: f64,
 }
 
@@ -28,8 +28,8 @@ impl Default for MeasureOptions {
 }
 
 impl MeasureOptions {
-    /// Lengths of the measurement that nobody states are proportional to the margin, the reach of an edge's blur: they
-    /// were tried at 0.5 mm. One at that margin, two where everything is twice as large.
+    /// Scale of the lengths that no option states. They are proportional to the margin, the reach of an edge's blur,
+    /// and were tried at 0.5 mm: 1 at that margin, 2 where everything is twice as large.
     pub(in crate::find) fn unit(&self) -> f64 {
         self.margin_mm / 0.5
     }

@@ -1,5 +1,5 @@
-//! In: a cloud and the shots it is from. Out: its points in the order of the sensor: one row a shot, one column a
-//! pixel of the stripe, so that a point's neighbours along the stripe and in the next shot are known.
+//! In: a cloud and its shots. Out: its points in the order of the sensor: one row for each shot, one column for each
+//! pixel along the stripe. Neighbours along the stripe and in the next shot are thus known.
 //! Frame and unit: base frame, mm.
 
 use super::options::MeasureOptions;
@@ -23,31 +23,30 @@ pub struct Ordered {
     pub row: Vec<u32>,
     /// Pixel along the stripe, counted from the first that any shot reached.
     pub column: Vec<u32>,
-    /// Along which axis of the picture columns are counted.
+    /// Axis of the picture along which columns are counted.
     pub along: Along,
     /// Shot number of each row.
     pub shot: Vec<u32>,
-    /// Where the camera stood at each row's shot; `None` where nobody knows.
+    /// Camera pose at each row's shot; `None` where it is unknown.
     pub from_camera: Vec<Option<Rigid<Base, Camera>>>,
     /// Pixel (u, v) of each point.
     pub pixel: Vec<[f32; 2]>,
-    /// How far along a surface the light lies that a point was measured from, mm; 0 where nobody measured the
-    /// stripe's width.
+    /// Length along a surface of the light that a point was measured from, mm; 0 where the stripe's width is unknown.
     pub reach_mm: f64,
     columns: usize,
     index: Vec<u32>,
 }
 
-/// Fewer points hold no part.
+/// A cloud with fewer points holds no part.
 pub const MIN_POINTS: usize = 500;
-/// No sensor is wider, px.
+/// More than the width of any sensor, px.
 const FARTHEST_PX: f32 = 131_072.0;
 
 impl Ordered {
-    /// Sorts a cloud. The strongest of several points in one pixel column of a shot stays.
+    /// Sorts a cloud. Of several points in one pixel column of a shot, the strongest is used.
     ///
     /// # Errors
-    /// A cloud that is too small, damaged, or of other shots than those that are listed.
+    /// A cloud that is too small, damaged, or has shots that are not listed.
     pub fn new(cloud: &[CloudPoint], shots: &Shots) -> Result<Ordered> {
         whole(cloud)?;
         let mut shot: Vec<u32> = cloud.iter().map(|p| p.shot).collect();
@@ -60,7 +59,7 @@ impl Ordered {
         Ok(ordered)
     }
 
-    /// The points of a table in its order; its indices into the cloud become such into these.
+    /// The points of a table in its order; its indices into the cloud become indices into these points.
     fn filled(
         cloud: &[CloudPoint],
         Table { columns, mut index }: Table,
@@ -98,8 +97,8 @@ impl Ordered {
         out
     }
 
-    /// Two widths of the stripe, and along a slanted one what profiles along an image axis go farther, in the usual
-    /// steps between neighbours along it.
+    /// Two widths of the stripe, in mm by the median step between neighbours along it. For a slanted stripe it is
+    /// longer by the extra reach of profiles along an image axis.
     fn reach(&self, stripe_px: f32) -> f64 {
         let across = |i: usize| self.pixel[i][usize::from(self.along == Along::U)];
         let beside = |i: usize| self.at(i64::from(self.row[i]), i64::from(self.column[i]) + 1);
@@ -123,14 +122,14 @@ impl Ordered {
         self.row.partition_point(|&r| r < row)..self.row.partition_point(|&r| r <= row)
     }
 
-    /// True where `column` lies within the columns that any shot reached, so that an empty place there
-    /// says that no light was seen.
+    /// True where `column` lies within the columns that any shot reached, so that an empty place there means that no
+    /// light was seen.
     pub fn covers(&self, row: i64, column: i64) -> bool {
         row >= 0 && row < self.shot.len() as i64 && column >= 0 && column < self.columns as i64
     }
 }
 
-/// Refuses a cloud that is too small or holds what no scan writes.
+/// Refuses a cloud that is too small, or that holds values which no scan writes.
 fn whole(cloud: &[CloudPoint]) -> Result<()> {
     if cloud.len() < MIN_POINTS {
         return Err(Fault::refused(format!("the scan has {} points, at least {MIN_POINTS} are needed", cloud.len()))
@@ -151,7 +150,7 @@ fn whole(cloud: &[CloudPoint]) -> Result<()> {
     Ok(())
 }
 
-/// Where the camera stood at each shot: at all of them, or nobody knows of any.
+/// The camera's pose at each shot: known for all of them, or for none.
 fn places(shot: &[u32], shots: &Shots) -> Result<Vec<Option<Rigid<Base, Camera>>>> {
     let from_camera: Vec<_> = shot.iter().map(|s| shots.place(*s).copied()).collect();
     if let Some(i) = from_camera.iter().position(Option::is_none)
@@ -196,7 +195,7 @@ impl Table {
     }
 }
 
-/// Points at and around the part in its own frame; `None` for the others.
+/// Points at and around the part, in the part frame; `None` for all others.
 pub fn localise(
     points: &Ordered,
     drawing: &Drawing,

@@ -26,33 +26,32 @@ pub struct Measured {
     pub base_from_part: Rigid<Base, Part>,
     /// 6 x 6 over x y z rx ry rz about the part's own axes, mm and rad.
     pub covariance: Matrix6<f64>,
-    /// Points that gave height and tilt, and their robust deviation, mm.
+    /// Number of points that gave height and tilt.
     pub surface_points: usize,
     /// Robust deviation of these points from their faces, mm.
     pub surface_rms: f64,
-    /// Surface ends at the drawn edges, and their robust deviation, mm.
+    /// Number of surface ends at the drawn edges.
     pub edges: usize,
     /// Robust deviation of these ends from the drawn edges, mm.
     pub edge_rms: f64,
-    /// Samples whose light gave place and turn, and its robust deviation as a share; 0 where too few were seen and the
-    /// ends gave them.
+    /// Number of samples whose light gave place and turn; 0 where too few were seen and the ends gave them.
     pub lit: usize,
     /// Robust deviation of that light, as a share of a fully lit sample's.
     pub lit_rms: f64,
-    /// How much farther than drawn surfaces reach along the stripe and from shot to shot, mm.
+    /// How much farther than drawn the surfaces reach along the stripe and from shot to shot, mm.
     pub growth: [f64; 2],
-    /// Largest distance between neighbouring samples along the stripe and from shot to shot, mm.
+    /// Median distance between neighbouring samples along the stripe and from shot to shot, mm.
     pub step: [f64; 2],
-    /// The surface ends themselves, those that locate nothing too.
+    /// All surface ends, including those that do not locate the part.
     pub observations: Vec<Observation>,
     /// The part's sizes against the drawing; `None` where too few edges were seen.
     pub shape: Option<Shape>,
 }
 
-/// Rounds of datum and ends, then of datum and light; the pose moves by less than a micrometre in the last.
+/// Rounds of datum and ends, then of datum and light; in the last the pose moves by less than a micrometre.
 const ROUNDS: usize = 6;
 const LIT_ROUNDS: usize = 4;
-/// What all points of a level surface have in common, which no residual shows: their peaks lie at the same phase of the
+/// Error that all points of a level surface share and no residual shows: their peaks lie at the same phase of the
 /// pixels. Share of a sampling step, standard deviation: a thousandth of a pixel.
 const LEVEL_BIAS: f64 = 1e-3;
 
@@ -71,14 +70,15 @@ pub fn measure(
             .next("draw at least one rectangle, circle or polygon with inside = \"high\""));
     }
     let mut part = Measuring { points, drawing, faces: &faces, edges: &edges, options, pose: start };
-    // Ends of surfaces lead to within some hundredths of a millimetre, the light of the samples beside them from there.
+    // Ends of surfaces bring the pose to within some hundredths of a millimetre; the light of the samples beside them
+    // refines it.
     part.follow_ends()?;
     let lit = part.follow_light()?;
     let datum = part.level(ROUNDS)?;
     let local = part.local();
     let (observations, step) = part.ends(&local, options.edge_gate_mm);
     let mut plane = fit_edges(observations, &step, options)?;
-    // What the ends alone would still move is common to all of them: the light knows better.
+    // A step that the ends alone would still make is common to all of them: the light is more accurate.
     for o in &mut plane.observations {
         o.residual -= o.nx * plane.step.x + o.ny * plane.step.y + (o.x * o.ny - o.y * o.nx) * plane.step.z;
     }
@@ -100,7 +100,7 @@ pub fn measure(
     })
 }
 
-/// A pose on its way to the points.
+/// A pose while it is fitted to the points.
 struct Measuring<'a> {
     points: &'a Ordered,
     drawing: &'a Drawing,
@@ -140,7 +140,7 @@ impl Measuring<'_> {
         Ok(())
     }
 
-    /// `None` where too few samples are lit in part.
+    /// Refines the pose by light; `None` where too few samples are partly lit.
     fn follow_light(&mut self) -> Result<Option<Lit>> {
         let mut lit = None;
         for _ in 0..LIT_ROUNDS {
@@ -158,8 +158,8 @@ fn in_plane(step: &Vector3<f64>) -> Rigid<Part, Part> {
     Rigid::from_vectors(&Vec3::new(0.0, 0.0, step.z), Vec3::new(step.x, step.y, 0.0))
 }
 
-/// Of x y z rx ry rz, from that of the datum (z rx ry), that in the plane (x y rz), and what all heights have in
-/// common, mm.
+/// Covariance over x y z rx ry rz, from that of the datum (z rx ry), that in the plane (x y rz), and the error that all
+/// heights share, mm.
 fn covariance(datum: &Matrix3<f64>, in_plane: &Matrix3<f64>, level_bias: f64) -> Matrix6<f64> {
     let mut out = Matrix6::zeros();
     for (part, at) in [(datum, [2, 3, 4]), (in_plane, [0, 1, 5])] {

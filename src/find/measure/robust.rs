@@ -13,7 +13,7 @@ pub(in crate::find) struct Fit<const N: usize> {
     pub weights: Vec<f64>,
 }
 
-/// 0 of none.
+/// The median; 0 for an empty list.
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -54,7 +54,7 @@ pub(in crate::find) fn robust<const N: usize>(
     }
     let middle = across_shots(rows, &weights, &step);
     let used = weights.iter().filter(|w| **w > 0.0).count();
-    // A weighted mean follows a shift of its rows by the mean slope of the influence only, not by the mean weight.
+    // A weighted mean follows a shift of its rows only by the mean slope of the influence, not by the mean weight.
     let (mut weight, mut slope) = (0.0, 0.0);
     for ((j, r, _), w) in rows.iter().zip(&weights).filter(|(_, w)| **w > 0.0) {
         let u = (r - j.dot(&step)) / (TUKEY * sigma);
@@ -74,12 +74,12 @@ pub(in crate::find) fn robust<const N: usize>(
     Some(Fit { step, covariance, used, sigma, weights })
 }
 
-/// Inverse of a normal matrix; `None` where a motion is free.
+/// Inverse of a normal matrix; `None` where a motion is undetermined.
 fn inverted<const N: usize>(a: &SMatrix<f64, N, N>) -> Option<SMatrix<f64, N, N>> {
     let scale = SVector::<f64, N>::from_fn(|k, _| a[(k, k)].max(1e-300).sqrt().recip());
     let unit = SMatrix::<f64, N, N>::from_fn(|i, k| a[(i, k)] * scale[i] * scale[k]);
     let decomposed = nalgebra::Cholesky::new(unit)?;
-    // The smallest pivot of a unit-diagonal matrix is near 0 where a motion is free.
+    // The smallest pivot of a unit-diagonal matrix is near 0 where a motion is undetermined.
     if (0..N).any(|k| decomposed.l()[(k, k)] < 1e-3) {
         return None;
     }
@@ -87,13 +87,13 @@ fn inverted<const N: usize>(a: &SMatrix<f64, N, N>) -> Option<SMatrix<f64, N, N>
     Some(SMatrix::from_fn(|i, k| inv[(i, k)] * scale[i] * scale[k]))
 }
 
-/// Scatter of the shots' own pulls: the middle of the sandwich.
+/// Scatter of the shots' scores: the middle of the sandwich.
 fn across_shots<const N: usize>(
     rows: &[(SVector<f64, N>, f64, u32)],
     weights: &[f64],
     step: &SVector<f64, N>,
 ) -> SMatrix<f64, N, N> {
-    // In order, so that the same scan gives the same sums to the last bit.
+    // The order is fixed, so that the same scan gives the same sums to the last bit.
     let mut by_shot: BTreeMap<u32, SVector<f64, N>> = BTreeMap::new();
     for ((j, r, shot), w) in rows.iter().zip(weights) {
         *by_shot.entry(*shot).or_insert_with(SVector::zeros) += *w * (r - j.dot(step)) * j;

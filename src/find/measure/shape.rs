@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Sizes against the drawing: lengths along the part's x and y and the shear between them.
+/// Sizes relative to the drawing: lengths along the part's x and y and the shear between them.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
     /// How much longer than drawn along x and y, as shares, and the shear between them, rad.
@@ -12,7 +12,7 @@ pub struct Shape {
     pub covariance: Matrix3<f64>,
 }
 
-/// By how much an edge at a place moves along its normal for each of the three.
+/// How far an edge at a place moves along its normal for each of the three sizes.
 pub(in crate::find) fn shape_row(x: f64, y: f64, nx: f64, ny: f64) -> [f64; 3] {
     [x * nx, y * ny, 0.5 * (x * ny + y * nx)]
 }

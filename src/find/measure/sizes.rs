@@ -1,5 +1,4 @@
-//! In: ends of surfaces and light beside their edges, the drawing. Out: the sizes that were measured against the
-//! drawn ones.
+//! In: ends of surfaces and light beside their edges, the drawing. Out: the measured sizes relative to the drawn ones.
 //! Frame and unit: the part's axes; shares, shear in rad. docs/math.md, Sizes.
 
 use super::lit_edges::Lit;
@@ -8,12 +7,12 @@ use super::shape::{Shape, shape_row};
 use super::surface_ends::Observation;
 use nalgebra::{SVector, Vector3};
 
-/// Measures the sizes: from the ends of surfaces to some tenths of a percent, from there by light.
+/// Measures the sizes: from the ends of surfaces to some tenths of a percent, then refined by light.
 pub(in crate::find) fn measure_shape(
     ends: &[Observation],
     by_light: impl Fn(Vector3<f64>) -> Option<Lit>,
 ) -> Option<Shape> {
-    // Place, turn, growth along the stripe and from shot to shot, sizes.
+    // Unknowns: place, turn, growth along the stripe and from shot to shot, sizes.
     let row = |o: &Observation| {
         let mut j = SVector::<f64, 8>::zeros();
         (j[0], j[1], j[2], j[3 + o.axis]) = (o.nx, o.ny, o.x * o.ny - o.y * o.nx, 1.0);

@@ -1,7 +1,7 @@
-//! In: the points of a scan, a drawing, a pose that may be shifted: along a long part, or by a shadow. Out: the shift
-//! at which most points lie where the drawing says.
-//! Frame and unit: part frame, mm. Long parallel edges fit at every shift (the aperture problem), so the
-//! search alone cannot tell; what lies at the part's ends can.
+//! In: the points of a scan, a drawing, a pose that may be shifted, along a long part or by a shadow. Out: the shift at
+//! which most points agree with the drawing.
+//! Frame and unit: part frame, mm. Long parallel edges fit at every shift (the aperture problem), so the search alone
+//! cannot decide; the points at the part's ends can.
 
 use super::datum::laid;
 use super::options::MeasureOptions;
@@ -12,14 +12,15 @@ use crate::geometry::{Base, Part, Rigid, Vec3};
 
 /// Length over width from which a part counts as long.
 const LONG: f64 = 4.0;
-/// Shifts that are tried: this share of the length to both sides, this far apart (in the recipe's unit).
+/// Range of the tried shifts as a share of the length to both sides, and their spacing in the recipe's unit.
 const REACH: f64 = 0.3;
 const STEP: f64 = 0.5;
-/// Shifts to all sides that are tried where a shadow may have misled the search, in the recipe's unit of about 1 mm.
+/// Range of the shifts in all directions, where a shadow may have misled the search, in the recipe's unit of about 1
+/// mm.
 const SHADOW: f64 = 4.0;
-/// A point this near to a face's height lies on it: the tilt is known only roughly; in the recipe's unit.
+/// Height tolerance for a point to lie on a face, in the recipe's unit: the tilt is known only roughly.
 const GATE: f64 = 1.0;
-/// Points that vote.
+/// Number of points that vote, about.
 const VOTERS: usize = 3000;
 
 /// 0 where the part is long in x, 1 in y, `None` where it is not long.
@@ -33,7 +34,7 @@ pub fn long_axis(drawing: &Drawing) -> Option<usize> {
     }
 }
 
-/// What is voted on: points around a part whose pose is roughly known, in its own frame, and the faces that it has.
+/// The voters: points around a part whose pose is roughly known, in the part frame, and the part's faces.
 struct Voters {
     points: Vec<Vec3>,
     faces: Vec<Face>,
@@ -50,7 +51,7 @@ impl Voters {
         Voters { points: all.into_iter().step_by(stride).collect(), faces: drawing.faces(), gate: GATE * unit }
     }
 
-    /// Points on a face where there is one, less those that contradict a part shifted by `by`.
+    /// Points on a face that is drawn there, less those that contradict a part shifted by `by`.
     fn agree(&self, by: [f64; 2]) -> i64 {
         let vote = |q: &Vec3, f: &Face| match (f.material(q.x - by[0], q.y - by[1]), (q.z - f.z).abs() < self.gate) {
             (true, true) => 1,
@@ -65,7 +66,7 @@ fn shifted(pose: Rigid<Base, Part>, by: [f64; 2]) -> Rigid<Base, Part> {
     pose * Rigid::<Part, Part>::from_vectors(&Vec3::zeros(), Vec3::new(by[0], by[1], 0.0))
 }
 
-/// The pose laid onto the part's faces and shifted along its long axis to where the points agree best; as it was for
+/// The pose laid onto the part's faces and shifted along its long axis to where the points agree best; unchanged for
 /// parts that are not long.
 pub fn slide(
     points: &Ordered,

@@ -12,11 +12,11 @@ use crate::geometry::Vec3;
 /// The end of a surface, seen between two neighbouring samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation {
-    /// Place in the part frame, mm.
+    /// Position along the part's x, mm.
     pub x: f64,
-    /// Along the part's y, mm.
+    /// Position along the part's y, mm.
     pub y: f64,
-    /// Distance beyond the drawn edge (positive: the surface reaches farther), and the edge's normal.
+    /// Distance beyond the drawn edge, mm (positive: the surface reaches farther).
     pub residual: f64,
     /// x of the drawn edge's unit normal, away from the material.
     pub nx: f64,
@@ -24,57 +24,56 @@ pub struct Observation {
     pub ny: f64,
     /// 0 along the stripe, 1 from shot to shot.
     pub axis: usize,
-    /// Row of the ordered points, one a shot, whose sample ends there.
+    /// Row of the ordered points, one for each shot, that holds the last sample.
     pub row: u32,
     /// Index of the drawing's shape that the edge belongs to.
     pub shape: usize,
     /// Element of that shape's grid, row by row, from 0.
     pub element: usize,
-    /// Took part in locating the part.
+    /// True where the end takes part in locating the part.
     pub locates: bool,
     /// Weight in the robust fit, 0 to 1; stays 1 where the end does not locate.
     pub weight: f64,
 }
 
-/// An edge is taken from samples that cross it at up to 53 degrees from its normal, so that edges at 45
-/// degrees to the sweep are seen along the stripe and from shot to shot.
+/// Least cosine between a step from sample to sample and an edge's normal: up to 53 degrees. Edges at 45 degrees to the
+/// sweep are thus seen both along the stripe and from shot to shot.
 const LEAST_COSINE: f64 = 0.6;
 
-/// Where a sample's neighbours are, by side: the axis as in [`Observation::axis`], and the way to the next one in
-/// rows and columns.
+/// The sides of a sample: the axis as in [`Observation::axis`], then the step to the next sample in rows and columns.
 const SIDES: [(usize, i64, i64); 4] = [(0, 0, 1), (0, 0, -1), (1, 1, 0), (1, -1, 0)];
-/// So many steps of an axis give their median.
+/// Most steps of an axis that enter their median.
 const MOST_STEPS: usize = 4000;
 
-/// The step that leads to a sample on a face from the one before it.
+/// The step to a sample on a face from the one before it.
 struct Step {
     before: usize,
-    /// The neighbour behind the sample, on the face or not.
+    /// The neighbour after the sample, on the face or not.
     next: Option<usize>,
     dx: f64,
     dy: f64,
     length: f64,
 }
 
-/// A last sample on a face.
+/// The end of a face at its last sample.
 struct End {
-    /// Place of the sample before it in the part frame, mm, and the direction from there.
+    /// Position of the sample before the last one in the part frame, mm, and the direction from there.
     x: f64,
     y: f64,
     nx: f64,
     ny: f64,
-    /// Light of the last sample and the next one, in fully lit samples.
+    /// Light of the last sample and the next one, in units of a fully lit sample.
     lit: f64,
-    /// Of the face, mm.
+    /// Height of the face, mm.
     z: f64,
     /// Index into [`SIDES`].
     side: usize,
     row: u32,
 }
 
-/// Ends of surfaces: a sample on a face whose next neighbour is not. The end lies where the light that
-/// the last samples still send back says: a sample that is lit by half counts as half a step. With them come the
-/// usual steps between samples along the stripe and from shot to shot, mm.
+/// Finds the ends of surfaces: samples on a face whose next neighbour is not on it. The light that the last samples
+/// still return gives the place: a half-lit sample counts as half a step. Also returns the median steps between samples
+/// along the stripe and from shot to shot, mm.
 pub(in crate::find) fn surface_ends(
     points: &Ordered,
     local: &[Option<Vec3>],
@@ -104,9 +103,9 @@ pub(in crate::find) fn surface_ends(
             }
         }
     }
-    // The last sample is lit in part, so its place lies back from the sheet's: by less on the side where
-    // a wall below the edge still shows, by more on the side of the shadow. The usual last step of a
-    // side is therefore the ruler for that side, not the step between full samples.
+    // The last sample is partly lit, so its place lies behind the sheet's: by less on the side where a wall below the
+    // edge still shows, by more on the side of the shadow. The median last step of a side is therefore the ruler for
+    // that side, not the step between full samples.
     let rulers = last_steps.map(median);
     let observations = found.iter().filter_map(|end| end.at_edge(rulers[end.side], edges, gate)).collect();
     (observations, steps.map(median))
@@ -125,7 +124,8 @@ impl Samples<'_> {
         self.local[k].is_some_and(|p| (p.z - z).abs() <= gate)
     }
 
-    /// To sample `i` at `q` on the face at `z`; `None` where its neighbours on that side and opposite say nothing.
+    /// The step to sample `i` at `q` on the face at `z`; `None` where its neighbours on that side and opposite give no
+    /// information.
     fn step(&self, i: usize, q: &Vec3, z: f64, side: usize) -> Option<Step> {
         let (points, (_, dr, dc)) = (self.points, SIDES[side]);
         let (row, column) = (i64::from(points.row[i]), i64::from(points.column[i]));
@@ -145,7 +145,7 @@ impl Samples<'_> {
         })
     }
 
-    /// With the light of the last sample `i` and, where it still shows near the face, of the next one.
+    /// The end with the light of the last sample `i` and, where it still shows near the face, of the next one.
     fn end(&self, i: usize, step: &Step, z: f64, side: usize) -> End {
         let intensity = &self.points.intensity;
         let full = f64::from(intensity[step.before]).max(1e-6);
@@ -161,12 +161,12 @@ impl Samples<'_> {
 }
 
 impl End {
-    /// The end measured against the drawn edge; `None` where none is near in that direction. `ruler`: the usual last
-    /// step.
+    /// The end measured against the drawn edge; `None` where none is near in that direction. `ruler`: the median last
+    /// step of the side.
     fn at_edge(&self, ruler: f64, edges: &EdgeIndex, gate: f64) -> Option<Observation> {
         let reach = ruler * (0.5 + self.lit);
         let (x, y) = (self.x + self.nx * reach, self.y + self.ny * reach);
-        // The nearest edge of any direction: at a corner or beside a hole none is taken for another.
+        // The nearest edge in any direction is used: at a corner or beside a hole, no edge is mistaken for another.
         let s = edges.nearest(x, y, gate, |s| s.z == self.z)?;
         if s.nx * self.nx + s.ny * self.ny < LEAST_COSINE {
             return None;
@@ -187,12 +187,12 @@ impl End {
     }
 }
 
-/// The usual difference of shot numbers between rows.
+/// The least difference of shot numbers between rows.
 fn shot_stride(points: &Ordered) -> u32 {
     points.shot.windows(2).map(|w| w[1] - w[0]).min().unwrap_or(1)
 }
 
-/// From shot to shot an end is known only where no shot is missing before and behind it.
+/// From shot to shot, an end is known only where no shot is missing before or after it.
 fn consecutive(points: &Ordered, row: i64, dr: i64, stride: u32) -> bool {
     if dr == 0 {
         return true;

@@ -1,9 +1,9 @@
-//! In: points and lines with their sigmas. Out: what is built from them: middles, lines, meetings, offsets.
+//! In: points and lines with their sigmas. Out: values built from them: middles, lines, intersections, offsets.
 //! Frame and unit: the part frame; mm, rad.
 
 use crate::fault::{Fault, Result};
 
-/// What a construction gives: a point, with a direction where it has one.
+/// The result of a construction: a point, with a direction for a line or a lattice.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Value {
     /// Along the part's x, mm.
@@ -29,7 +29,7 @@ pub(super) fn middle(values: impl Iterator<Item = Value> + Clone) -> Value {
     }
 }
 
-/// Total least squares; points from the first towards the last.
+/// The line of total least squares; it points from the first point towards the last.
 pub(super) fn line_through(points: &[Value]) -> Result<Value> {
     let m = middle(points.iter().copied());
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
@@ -74,7 +74,7 @@ pub(super) fn meet(a: &Value, b: &Value) -> Result<Value> {
     Ok(Value { x: a.x + s * ca, y: a.y + s * sa, direction: None, sigma_mm: a.sigma_mm.hypot(b.sigma_mm) / det.abs() })
 }
 
-/// Along and across the direction of `d`, mm.
+/// A point moved by `by` along and across the direction of `d`, mm.
 pub(super) fn moved(p: &Value, d: &Value, by: [f64; 2]) -> Result<Value> {
     let angle = direction(d)?;
     let (s, c) = angle.sin_cos();

@@ -1,5 +1,5 @@
 //! In: a drawing (TOML): rectangles, circles, polygons, lines, arcs and grids of them, each on a surface.
-//! Out: the same, checked, and where its named shapes stand; drawn_edges.rs makes faces and edges of it.
+//! Out: the same, checked, and the positions of its named shapes; drawn_edges.rs makes faces and edges of it.
 //! Frame and unit: the part's frame (x along the long axis, z out of the part); mm.
 
 use super::outline::length;
@@ -14,8 +14,8 @@ pub struct Drawing {
     pub shape: Vec<Shape>,
 }
 
-/// Limits of a drawing. They keep the memory of a search below 512 MB and its time to some seconds; a part of that size
-/// lies before no sensor of this kind. Corners count those by which circles and arcs are cut into lines.
+/// Limits of a drawing. They keep the memory of a search below 512 MB and its time to some seconds; no sensor of this
+/// kind sees a part of that size. Corners include those by which circles and arcs are cut into lines.
 const MOST_CORNERS: f64 = 1.2e6;
 const MOST_EDGE_MM: f64 = 1e5;
 const MOST_HEIGHTS: f64 = 100.0;
@@ -52,7 +52,7 @@ impl Drawing {
         self.check_size()
     }
 
-    /// Refuses what no part is and no search ends with: a slipped decimal point, a whole assembly.
+    /// Refuses sizes that no part has and no search can handle: a slipped decimal point, a whole assembly.
     fn check_size(&self) -> Result<()> {
         let corners: usize = self.shape.iter().map(|s| s.outline().0.len() * s.elements()).sum();
         let mut heights: Vec<f64> = self.shape.iter().map(|s| s.z_mm).collect();

@@ -8,7 +8,7 @@ use super::outline::{bounds, diameter};
 use super::shape::{Form, Grid, Inside};
 use crate::geometry::Vec3;
 
-/// A polyline with what it bounds.
+/// A polyline and what it bounds.
 #[derive(Clone, Debug)]
 struct Contour {
     points: Vec<[f64; 2]>,
@@ -23,8 +23,8 @@ struct Contour {
     element: usize,
 }
 
-/// -1 where the material lies right of the contour at a place, 1 where left, or where nothing tells; `None` where it
-/// lies on both sides or on neither. `r` points right.
+/// -1 where the material lies right of the contour at a place, 1 where it lies left or is unknown; `None` where it lies
+/// on both sides or on neither. `r` points right.
 fn side(c: &Contour, face: Option<&Face>, [x, y]: [f64; 2], [rx, ry]: [f64; 2]) -> Option<f64> {
     let sign = match (c.closed && c.inside != Inside::Either, face) {
         (true, Some(f)) => {
@@ -42,7 +42,7 @@ fn side(c: &Contour, face: Option<&Face>, [x, y]: [f64; 2], [rx, ry]: [f64; 2]) 
     Some(sign)
 }
 
-/// A place on an edge of the drawing.
+/// A point on an edge of the drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeSample {
     /// Along the part's x, mm.
@@ -53,19 +53,19 @@ pub struct EdgeSample {
     pub nx: f64,
     /// y of that normal.
     pub ny: f64,
-    /// Height of the high side.
+    /// Height of the high side, mm.
     pub z: f64,
-    /// Direction of contrast unknown.
+    /// True where the direction of contrast is unknown.
     pub either: bool,
-    /// Size of the shape that the edge belongs to.
+    /// Diameter of the shape that the edge belongs to, mm.
     pub extent: f64,
     /// Used by the search for the part.
     pub search: bool,
-    /// Measured on the points: of closed shapes whose high side is known.
+    /// Measured on the points: only edges of closed shapes whose high side is known.
     pub measure: bool,
-    /// Takes part in locating the part.
+    /// True where it takes part in locating the part.
     pub locates: bool,
-    /// Index of the shape, and of the element of its grid (row by row).
+    /// Index of the shape that the edge belongs to.
     pub shape: usize,
     /// Element of that shape's grid, row by row, from 0.
     pub element: usize,
@@ -74,7 +74,7 @@ pub struct EdgeSample {
 }
 
 impl Drawing {
-    /// The level surfaces that measuring shapes bound, one a height, in the order of the drawing.
+    /// The level surfaces that closed shapes bound, one for each height, in the order of the drawing.
     pub fn faces(&self) -> Vec<Face> {
         let mut faces: Vec<(f64, Vec<_>, Vec<_>)> = Vec::new();
         for c in self.contours().into_iter().filter(|c| c.closed && c.inside != Inside::Either) {
@@ -88,8 +88,8 @@ impl Drawing {
         faces.into_iter().map(|(z, high, low)| Face::new(z, high, low)).collect()
     }
 
-    /// Places along all edges, about `spacing` apart. An edge of one shape that lies inside another of
-    /// the same surface (both sides material, or neither) is no edge and is left out.
+    /// Points along all edges, about `spacing` apart. An edge of one shape that lies inside another of the same surface
+    /// (material on both sides, or on neither) is no edge and is skipped.
     pub fn samples(&self, spacing: f64) -> Vec<EdgeSample> {
         let faces = self.faces();
         let mut out = Vec::new();

@@ -1,4 +1,4 @@
-//! In: a drawing. Out: its measurable edges in buckets, so that the one nearest to a place is found at once.
+//! In: a drawing. Out: its measurable edges in buckets, in which the nearest edge to a place is found quickly.
 //! Frame and unit: part frame, mm.
 
 use super::drawing::Drawing;
@@ -13,13 +13,13 @@ pub struct EdgeIndex {
     buckets: HashMap<(i32, i32), Vec<u32>>,
 }
 
-/// Distance between samples, in units.
+/// Distance between samples, in units of the recipe.
 const SPACING: f64 = 0.05;
-/// Length of edge whose samples have what is not modelled in common, in units: about three widths of the sheet's
-/// light and a few samples, over which walls, chamfers and pixels change.
+/// Length of an edge piece whose samples share errors that are not modelled, in units. It is about three widths of the
+/// sheet's light and a few samples, over which walls, chamfers and pixels change.
 const PIECE: f64 = 4.0;
 
-/// The bucket of a place: one unit wide; no gate reaches farther than three of them.
+/// The bucket of a place, one unit wide; no gate reaches farther than three buckets.
 fn key(unit: f64, x: f64, y: f64) -> (i32, i32) {
     ((x / unit).floor() as i32, (y / unit).floor() as i32)
 }
@@ -56,11 +56,11 @@ impl EdgeIndex {
         }
         best.map(|b| b.1)
     }
-    /// The nearest edge at height `z` if it locates the part.
+    /// The nearest edge at height `z`, if that edge locates the part.
     pub fn nearest_locating(&self, x: f64, y: f64, gate: f64, z: f64) -> Option<&EdgeSample> {
         self.nearest(x, y, gate, |s| s.z == z).filter(|s| s.locates)
     }
-    /// Which piece of which edge a place beside it belongs to: shape, element, direction, place along it.
+    /// The piece of edge to which a place beside it belongs: shape, element, direction, position along the edge.
     pub fn piece(&self, s: &EdgeSample, x: f64, y: f64) -> (usize, usize, i32, i32) {
         let direction = (s.ny.atan2(s.nx) / std::f64::consts::FRAC_PI_4).round() as i32;
         (s.shape, s.element, direction, ((s.nx * y - s.ny * x) / (PIECE * self.unit)).floor() as i32)

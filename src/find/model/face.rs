@@ -1,4 +1,4 @@
-//! In: the closed outlines of one height. Out: a level surface, and at once whether a place lies on it.
+//! In: the closed outlines of one height. Out: a level surface, and a fast test of whether a place lies on it.
 //! Frame and unit: the part's frame; mm.
 
 use super::outline::crosses;
@@ -23,7 +23,8 @@ impl Face {
     }
 }
 
-/// Equal parts of a range, and in which of them a value lies: rising with the value, whatever is rounded.
+/// A range in equal parts, and the part in which a value lies. The part's number never falls as the value rises,
+/// whatever is rounded.
 #[derive(Clone, Copy, Debug)]
 struct Parts {
     low: f64,
@@ -45,7 +46,7 @@ impl Parts {
     }
 }
 
-/// Lists, one behind the other.
+/// Lists, stored one after another.
 #[derive(Clone, Debug, Default)]
 struct Lists {
     starts: Vec<u32>,
@@ -53,7 +54,7 @@ struct Lists {
 }
 
 impl Lists {
-    /// `each` gives (list, item) pairs, and the same ones each time it is called.
+    /// `each` gives (list, item) pairs, and must give the same ones each time it is called.
     fn new(lists: usize, each: impl Fn(&mut dyn FnMut(usize, usize))) -> Lists {
         let mut starts = vec![0; lists + 1];
         each(&mut |list, _| starts[list + 1] += 1);
@@ -73,7 +74,7 @@ impl Lists {
     }
 }
 
-/// Closed outlines, each in the cells of a grid that its box reaches into.
+/// Closed outlines, each listed in the grid cells that its box overlaps.
 #[derive(Clone, Debug)]
 struct Outlines {
     loops: Vec<Outline>,
@@ -112,7 +113,7 @@ impl Outlines {
     }
 }
 
-/// One closed outline with its sides in rows.
+/// One closed outline, its sides listed by rows.
 #[derive(Clone, Debug)]
 struct Outline {
     points: Vec<[f64; 2]>,
@@ -121,7 +122,7 @@ struct Outline {
     rows: Lists,
 }
 
-/// Sides a row, about, and most rows.
+/// Number of sides in a row, about, and most rows.
 const SIDES: usize = 8;
 const MOST_ROWS: usize = 512;
 
@@ -134,7 +135,7 @@ impl Outline {
             let (a, b) = (y.at(points[i][1]), y.at(points[(i + 1) % n][1]));
             a.min(b)..=a.max(b)
         };
-        // Sides that run through many rows, as a comb's, get fewer rows.
+        // Where sides run through many rows, as those of a comb do, there are fewer rows.
         while y.count > 1 && (0..n).map(|i| span(&y, i).count()).sum::<usize>() > SIDES * n {
             y.count /= 2;
         }
@@ -142,7 +143,7 @@ impl Outline {
         Outline { points, x, y, rows }
     }
 
-    /// Even-odd rule.
+    /// Whether a place lies inside, by the even-odd rule.
     fn holds(&self, x: f64, y: f64) -> bool {
         if !(self.x.hold(x) && self.y.hold(y)) {
             return false;
@@ -161,7 +162,7 @@ mod tests {
     use crate::find::model::outline::contains;
     use rand::{Rng, SeedableRng};
 
-    /// Outlines of every sort: few and many corners, combs, outlines without height, heaps of them.
+    /// Outlines of many kinds: few and many corners, combs, outlines without height, large numbers of them.
     #[test]
     fn the_index_says_what_the_plain_rule_says() {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(5);

@@ -8,12 +8,12 @@ use rayon::prelude::*;
 
 /// Gaussian weights with sigma 1 px at -2..2.
 const WEIGHT: [f32; 5] = [0.135_335_28, 0.606_530_66, 1.0, 0.606_530_66, 0.135_335_28];
-/// Below this share of the full weight a neighbourhood says nothing.
+/// A neighbourhood with less than this share of the full weight gives no slope.
 const MIN_WEIGHT: f32 = 0.35;
 /// Below this share of the full determinant the neighbourhood is nearly a line.
 const MIN_SPREAD: f32 = 0.10;
 
-/// Slopes of a layer; both 0 and `seen` false where they cannot be known.
+/// Slopes of a layer; where they are unknown, both are 0 and `seen` is false.
 #[derive(Clone, Debug)]
 pub struct Field {
     /// Columns, px.

@@ -1,15 +1,15 @@
-//! In: a drawing. Out: whether a part of it looks the same in a mirror, so that a scan of it cannot tell mirrored
+//! In: a drawing. Out: whether the drawn part looks the same in a mirror, so that a scan of it cannot reveal mirrored
 //! pictures.
 //! Frame and unit: part frame, mm; shares of the drawn surfaces.
 
 use super::drawing::Drawing;
 
-/// Places along a side of the box that is compared, and the share of the surfaces that has to differ for a scan to
-/// tell.
+/// Number of places along a side of the box that is compared, and the share of the surfaces that has to differ for a
+/// scan to reveal mirrored pictures.
 const SIDE: usize = 120;
 const TOLD: f64 = 0.002;
 
-/// True where less than two thousandths of the drawn surfaces lies elsewhere in a mirror along x or along y.
+/// True where less than two thousandths of the drawn surfaces lie elsewhere after mirroring along x or along y.
 pub fn own_mirror_image(drawing: &Drawing) -> bool {
     let (faces, b) = (drawing.faces(), drawing.bounds());
     let middle = [(b[0] + b[2]) / 2.0, (b[1] + b[3]) / 2.0];

@@ -10,7 +10,7 @@ pub(in crate::find) fn arc(c: [f64; 2], r: f64, from: f64, to: f64, steps: usize
         .collect()
 }
 
-/// Area to the left of an outline.
+/// Signed area of an outline, positive where it runs counter-clockwise.
 pub(in crate::find) fn area(p: &[[f64; 2]]) -> f64 {
     (0..p.len()).map(|i| (p[i], p[(i + 1) % p.len()])).map(|(a, b)| 0.5 * (a[0] * b[1] - b[0] * a[1])).sum()
 }
@@ -26,19 +26,19 @@ pub(in crate::find) fn crosses(a: [f64; 2], b: [f64; 2], x: f64, y: f64) -> bool
     (a[1] > y) != (b[1] > y) && x < (b[0] - a[0]) * (y - a[1]) / (b[1] - a[1]) + a[0]
 }
 
-/// Even-odd rule.
+/// Whether a place lies inside, by the even-odd rule.
 pub(in crate::find) fn contains(p: &[[f64; 2]], x: f64, y: f64) -> bool {
     (0..p.len()).filter(|&i| crosses(p[i], p[(i + 1) % p.len()], x, y)).count() % 2 == 1
 }
 
-/// Length of an outline's sides, that from its last point to its first included where it is closed.
+/// Length of an outline's sides; a closed outline includes the side from its last point to its first.
 pub(in crate::find) fn length(p: &[[f64; 2]], closed: bool) -> f64 {
     let side = |i: usize| (p[(i + 1) % p.len()][0] - p[i][0]).hypot(p[(i + 1) % p.len()][1] - p[i][1]);
     (0..if closed { p.len() } else { p.len().saturating_sub(1) }).map(side).sum()
 }
 
-/// Largest distance between two points: of the corners of their convex hull, walked around by two opposite ones
-/// (rotating calipers, Shamos 1978).
+/// Largest distance between two points. It is found among opposite corners of their convex hull (rotating calipers,
+/// Shamos 1978).
 pub(in crate::find) fn diameter(points: &[[f64; 2]]) -> f64 {
     let hull = hull(points);
     let n = hull.len();
@@ -52,13 +52,13 @@ pub(in crate::find) fn diameter(points: &[[f64; 2]]) -> f64 {
         while far(k + 1) > far(k) {
             k += 1;
         }
-        // The next one too: it may lie as far where sides are parallel.
+        // The next corner too: where sides are parallel it may lie as far.
         most = most.max(apart(i, k)).max(apart(i + 1, k)).max(apart(i, k + 1)).max(apart(i + 1, k + 1));
     }
     most
 }
 
-/// Twice the area of a triangle, positive to the left.
+/// Twice the area of a triangle, positive where it runs counter-clockwise.
 fn cross(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }

@@ -1,5 +1,5 @@
-//! In: one shape of a drawing, as a person wrote it. Out: the shape, checked; its outline as a polyline,
-//! counter-clockwise where it is closed.
+//! In: one shape of a drawing, as the user wrote it. Out: the shape, checked; its outline as a polyline,
+//! counter-clockwise if it is closed.
 //! Frame and unit: the part's frame; mm.
 
 use super::outline::{arc, area};
@@ -8,7 +8,7 @@ use crate::fault::{Fault, Result};
 /// Most elements of a grid.
 const MOST_ELEMENTS: u64 = 10_000;
 
-/// The kinds of shape a drawing knows.
+/// The kinds of shape in a drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Form {
@@ -28,16 +28,17 @@ pub enum Form {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Inside {
-    /// The inside of a closed shape is material. Of a line or an arc (walked from start to end): the left side.
+    /// The inside of a closed shape is material. For a line or an arc (from start to end), the left side is the high
+    /// one.
     #[default]
     High,
-    /// The inside is a hole in the surface at `z_mm`. Of a line or an arc: the right side is the high one.
+    /// The inside is a hole in the surface at `z_mm`. For a line or an arc, the right side is the high one.
     Low,
-    /// Not known; the direction of the edge's contrast is ignored.
+    /// Unknown; the direction of the edge's contrast is ignored.
     Either,
 }
 
-/// A rectangular array about the shape's own place.
+/// A rectangular array about the shape's own position.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
@@ -51,24 +52,24 @@ pub struct Grid {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shape {
-    /// Says which of the other keys are needed.
+    /// Kind of the shape; it states which of the other keys are needed.
     pub kind: Form,
-    /// A name by which constructions refer to it: `name`, or `name[column,row]` in a grid, from 1.
+    /// Name by which constructions refer to it: `name`, or `name[column,row]` in a grid, from 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// rectangle, circle, arc: mm.
+    /// rectangle, circle, arc: centre, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub centre: Option<[f64; 2]>,
     /// rectangle: full width and height, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size: Option<[f64; 2]>,
-    /// circle, arc: mm.
+    /// circle, arc: radius, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radius: Option<f64>,
     /// rectangle: turn about its centre, degrees. Default 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angle_deg: Option<f64>,
-    /// arc: from where to where, counter-clockwise, degrees.
+    /// arc: start and end, counter-clockwise, degrees.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub span_deg: Option<[f64; 2]>,
     /// polygon: corners; line: its two ends; mm.
@@ -77,10 +78,10 @@ pub struct Shape {
     /// Which side of its edges is the higher one. Default high.
     #[serde(default)]
     pub inside: Inside,
-    /// Height of the surface that the shape is (high) or cuts into (low), mm. Default 0, the datum.
+    /// Height of the surface that the shape forms (high) or cuts into (low), mm. Default 0, the datum.
     #[serde(default)]
     pub z_mm: f64,
-    /// Repeats the shape about its own place. Default once.
+    /// Repeats the shape about its own position. Default once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grid: Option<Grid>,
     /// Used by the search for the part. Default true.
@@ -89,14 +90,14 @@ pub struct Shape {
     /// Its edges are measured on the points. Default true.
     #[serde(default = "yes")]
     pub measure: bool,
-    /// Its edges locate the part. False for what is measured by itself only, such as contacts whose
-    /// springs and lips blur their edges. Default true.
+    /// Its edges locate the part. False for shapes that are only measured separately, such as contacts whose springs
+    /// and lips blur their edges. Default true.
     #[serde(default = "yes")]
     pub locates: bool,
 }
 
 impl Shape {
-    /// A shape on the datum surface without its dimensions; all else as where a file names nothing.
+    /// A shape on the datum surface without its dimensions; all else has its default value.
     pub fn new(kind: Form, inside: Inside) -> Shape {
         Shape {
             kind,
@@ -122,7 +123,7 @@ fn yes() -> bool {
 }
 
 impl Shape {
-    /// How often its grid repeats it.
+    /// Number of elements of its grid; 1 without a grid.
     pub fn elements(&self) -> usize {
         self.grid.map_or(1, |g| g.count[0] as usize * g.count[1] as usize)
     }
@@ -182,8 +183,8 @@ impl Shape {
 }
 
 impl Shape {
-    /// Corner points, counter-clockwise for closed shapes, and whether it is closed. Curves are cut so
-    /// finely that they stay within 0.5 per mille of their radius.
+    /// Corner points, counter-clockwise for closed shapes, and whether it is closed. Curves are divided so finely that
+    /// chords stay within 0.5 per mille of the radius.
     pub(in crate::find) fn outline(&self) -> (Vec<[f64; 2]>, bool) {
         let c = self.centre.unwrap_or([0.0, 0.0]);
         let r = self.radius.unwrap_or(0.0);

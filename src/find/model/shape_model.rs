@@ -1,5 +1,5 @@
-//! In: a region of a scene, or a drawing. Out: a shape model: edge places with the direction of their
-//! contrast, one list a pyramid level.
+//! In: a region of a scene, or a drawing. Out: a shape model: edge points with the direction of their contrast, one
+//! list for each pyramid level.
 //! Frame and unit: pixels of level 0 about the model's reference point; x right, y down the rows.
 
 use super::drawing::Drawing;
@@ -7,7 +7,7 @@ use super::gradient::{Field, slopes};
 use crate::fault::{Fault, Result};
 use crate::find::scene::{Kind, Region, Scene, from_level};
 
-/// An edge place: where, and the unit direction in which values rise.
+/// An edge point: its position, and the unit direction in which values rise.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ModelPoint {
     /// Right of the reference point, px of level 0.
@@ -18,25 +18,25 @@ pub struct ModelPoint {
     pub gx: f64,
     /// y of the direction in which values rise.
     pub gy: f64,
-    /// Of the layer in which the edge is looked for.
+    /// Kind of the layer in which the edge is searched.
     pub kind: Kind,
-    /// The direction of contrast is unknown: rising and falling both fit.
+    /// True where the direction of contrast is unknown: rising and falling both fit.
     pub either: bool,
 }
 
 /// A shape to be found.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ShapeModel {
-    /// Edge places a pyramid level, all in pixels of level 0.
+    /// Edge points of each pyramid level, all in pixels of level 0.
     pub levels: Vec<Vec<ModelPoint>>,
     /// Largest distance of an edge from the reference point, px.
     pub radius: f64,
-    /// Half width and half height of the box around the edges, and its centre; px.
+    /// Half width and half height of the box around the edges, px.
     pub half_size: [f64; 2],
     /// Centre of that box from the reference point, px.
     pub centre: [f64; 2],
-    /// How many edge places of level 0 hold what one of them alone would tell, 1 or more: neighbours along an edge
-    /// see the same noise, layers that show the same edge see the same edge.
+    /// How many edge points of level 0 together hold the information of a single one, 1 or more. Neighbours along an
+    /// edge see the same noise, and layers that show the same edge add little.
     pub redundancy: f64,
 }
 
@@ -44,10 +44,10 @@ pub struct ShapeModel {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ModelOptions {
-    /// Weakest edge of a region that enters, as a share of its 95th percentile. 0.02 to 1. Low takes
-    /// texture in, high leaves weak outlines out.
+    /// Weakest edge of a region that is used, as a share of its 95th percentile, 0.02 to 1. A low value includes
+    /// texture, a high one excludes weak outlines.
     pub contrast: f64,
-    /// Most edge places on the finest level, 30 to 5000. More are slower and a little more precise.
+    /// Most edge points on a level, 30 to 5000. More are slower and a little more precise.
     pub max_points: usize,
     /// Most pyramid levels, 1 to 8. Fewer are slower and lose less detail.
     pub max_levels: usize,
@@ -80,15 +80,16 @@ impl ModelOptions {
     }
 }
 
-/// A model with fewer places says nothing.
+/// Least number of edge points of a model.
 pub const MIN_POINTS: usize = 12;
 /// The coarsest level keeps the model at least this large (half diagonal, px of that level).
 const MIN_RADIUS: f64 = 14.0;
-/// A level with fewer places is not used.
+/// A level with fewer edge points is not used.
 const MIN_LEVEL_POINTS: usize = 20;
 
 impl ShapeModel {
-    /// A model of what is seen in `region`. The reference point is the region's centre unless given.
+    /// A model of the edges seen in `region`. The reference point is the region's centre unless stated. Refuses a
+    /// region outside the scene, and one with too few edges.
     pub fn from_region(
         scene: &Scene,
         region: Region,
@@ -128,8 +129,7 @@ impl ShapeModel {
         Self::finish(levels, "the region")
     }
 
-    /// A model of a drawing on a map of `mm_per_px`. Shapes smaller than 5 px of a level are left out of
-    /// that level.
+    /// A model of a drawing on a map of `mm_per_px`. Shapes smaller than 5 px of a level are excluded from that level.
     pub fn from_drawing(drawing: &Drawing, mm_per_px: f64, kind: Kind, options: &ModelOptions) -> Result<ShapeModel> {
         options.check()?;
         drawing.check()?;
@@ -137,7 +137,7 @@ impl ShapeModel {
             return Err(Fault::usage(format!("mm_per_px is {mm_per_px}; allowed: above 0"))
                 .next("give the edge of the map's cells in mm"));
         }
-        // Of long edges no more places than the model can hold, many times over.
+        // On long edges, no more than 20 times the points that the model can hold.
         let spacing = drawing.edge_length() / (20 * options.max_points) as f64;
         let samples = drawing.samples(spacing.max(0.5 * mm_per_px));
         let levels = (0..options.max_levels)
@@ -161,10 +161,10 @@ impl ShapeModel {
         Self::finish(levels, "the drawing")
     }
 
-    /// The model of those edge places that `keep` names.
+    /// The model of only those edge points for which `keep` is true.
     ///
     /// # Errors
-    /// Too few of them.
+    /// Too few edge points remain.
     pub fn only(self, keep: impl Fn(&ModelPoint) -> bool) -> Result<ShapeModel> {
         let chosen = |level: Vec<ModelPoint>| level.into_iter().filter(&keep).collect();
         Self::finish(self.levels.into_iter().map(chosen).collect(), "the part of the region that is seen")
@@ -198,14 +198,14 @@ impl ShapeModel {
     }
 }
 
-/// Square of the distance beyond which two places share no noise, px²: exp(-d²/4) is below a thousandth.
+/// Square of the distance beyond which two points share no noise, px²: exp(-d²/4) is below a thousandth.
 const APART_SQUARED: f64 = 28.0;
 
-/// Sum of a place's correlations with all places, itself included, mean over the places: by how much the variance of
-/// what they tell together exceeds that of as many independent ones. exp(-d²/4) is the correlation that the 5x5 plane
-/// fit (sigma 1 px) leaves at a distance of d px. Places of several layers count alike: what moves an edge in one
-/// (the sheet's width, the raster of pixels, a chamfer) moves it in the others, so a second layer guards against gaps
-/// but does not halve the variance.
+/// Sum of a point's correlations with all points, itself included, as a mean over the points. This is the factor by
+/// which the variance of their common result exceeds that of equally many independent points. exp(-d²/4) is the
+/// correlation that the 5x5 plane fit (sigma 1 px) leaves at a distance of d px. Points of several layers count alike:
+/// what moves an edge in one layer (the sheet's width, the raster of pixels, a chamfer) moves it in the others. A
+/// second layer thus guards against gaps but does not halve the variance.
 fn redundancy(points: &[ModelPoint]) -> f64 {
     let shared = |p: &ModelPoint, o: &ModelPoint| {
         let d2 = (o.x - p.x).powi(2) + (o.y - p.y).powi(2);
@@ -213,7 +213,7 @@ fn redundancy(points: &[ModelPoint]) -> f64 {
             return 0.0;
         }
         let cosine = o.gx * p.gx + o.gy * p.gy;
-        // Light may fall where height rises; within a layer edges that face each other are two.
+        // Light may fall where height rises; within a layer, edges that face each other are two separate edges.
         let alike = if o.kind == p.kind && !p.either { cosine.max(0.0) } else { cosine.abs() };
         alike * (-0.25 * d2).exp()
     };
@@ -221,7 +221,7 @@ fn redundancy(points: &[ModelPoint]) -> f64 {
     (sum / points.len() as f64).max(1.0)
 }
 
-/// An edge place of a field with its sub-pixel position.
+/// An edge point of a field with its sub-pixel position.
 #[derive(Clone, Copy, Debug)]
 pub struct Edge {
     /// Column, px.
@@ -236,8 +236,8 @@ pub struct Edge {
     pub strength: f64,
 }
 
-/// Ridges of the slope's magnitude inside `[x0, y0, x1, y1)`, above `contrast` times the 95th percentile
-/// there and three times the noise, with at least two like neighbours.
+/// Ridges of the slope's magnitude inside `[x0, y0, x1, y1)`, above both `contrast` times the 95th percentile there and
+/// three times the noise, with at least two neighbours of similar direction.
 pub fn edges(field: &Field, [x0, y0, x1, y1]: [usize; 4], contrast: f64) -> Vec<Edge> {
     let w = field.width;
     let (x0, y0) = (x0.max(2), y0.max(2));
@@ -291,8 +291,8 @@ pub fn edges(field: &Field, [x0, y0, x1, y1]: [usize; 4], contrast: f64) -> Vec<
     strong.iter().filter(|(i, e)| like(*i, e) >= 2).map(|(_, e)| *e).collect()
 }
 
-/// Where between -0.5 and 0.5 px a ridge with these three heights has its top: exact for a Gaussian,
-/// which is what a blurred step's slope is. `None` where the middle is not the highest.
+/// Position of the top of a ridge with these three heights, -0.5 to 0.5 px. It is exact for a Gaussian, the slope of a
+/// blurred step. `None` where the middle is not the highest.
 pub fn ridge_offset(before: f64, middle: f64, after: f64) -> Option<f64> {
     if !(middle > before && middle >= after) {
         return None;
@@ -305,8 +305,8 @@ pub fn ridge_offset(before: f64, middle: f64, after: f64) -> Option<f64> {
     Some((0.5 * (a - c) / (a - 2.0 * b + c)).clamp(-0.5, 0.5))
 }
 
-/// Keeps places at least `spacing` apart, the first in the list first; widens the spacing until at most
-/// `max` remain. A spacing that leaves more is given up at the first place too many.
+/// Thins the list to points at least `spacing` apart; earlier points take precedence. The spacing is widened until at
+/// most `max` remain, and each spacing is abandoned at the first point beyond `max`.
 pub fn thin(points: &[ModelPoint], mut spacing: f64, max: usize) -> Vec<ModelPoint> {
     'wider: loop {
         let mut taken = std::collections::HashMap::<(i64, i64), Vec<usize>>::new();

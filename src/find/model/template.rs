@@ -1,25 +1,25 @@
-//! In: a picture and the region of it that shows the part; or the file that was made of it. Out: a model with where
-//! it came from, for searches in other pictures; the file.
-//! Frame and unit: pixels of the picture; places of the model about the region's middle, turn 0 as in the picture.
+//! In: a picture and the region of it that shows the part, or a file made from them. Out: a model with its origin, for
+//! searches in other pictures; the file.
+//! Frame and unit: pixels of the picture; points of the model about the region's middle, turn 0 as in the picture.
 
 use super::shape_model::{MIN_POINTS, ModelOptions, ModelPoint, ShapeModel};
 use crate::fault::{Fault, Result};
 use crate::find::scene::{Kind, Region, Scene};
 use crate::raster::{Image, Mask};
 
-/// A part as one picture shows it. What `teach --region` writes and `match` reads.
+/// A part as one picture shows it. `teach --region` writes it and `match` reads it.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Template {
     /// Version of this file: 1.
     pub format: u32,
-    /// What the part is called.
+    /// Name of the part.
     pub name: String,
-    /// The picture it was taught from, as it was named then.
+    /// Name of the picture that it was taught from, as stated then.
     pub picture: String,
     /// SHA-256 of that picture's file.
     pub picture_sha256: String,
-    /// The part in that picture: x, y of its top left pixel, width, height; px.
+    /// Region of the part in that picture: x, y of its top left pixel, width, height; px.
     pub region_px: [u32; 4],
     /// How the edges were chosen.
     pub options: ModelOptions,
@@ -27,14 +27,14 @@ pub struct Template {
     pub model: ShapeModel,
 }
 
-/// Edges farther than this from the part's middle come from no picture, px.
+/// No picture gives edges farther than this from the part's middle, px.
 const FARTHEST_PX: f64 = 131_072.0;
-/// Places of a level in a file: [`ModelOptions::max_points`] at most.
+/// Most edge points of a level in a file, the upper limit of [`ModelOptions::max_points`].
 const MOST_PLACES: usize = 5000;
 
 impl Template {
-    /// Learns what `region` (x, y, width, height; all of the picture where `None`) shows. `source` is the picture's
-    /// name and SHA-256.
+    /// Learns what `region` shows (x, y, width, height; `None`: the whole picture). `source` is the picture's name and
+    /// SHA-256.
     ///
     /// # Errors
     /// A region that leaves the picture, one without a clear outline.
@@ -48,12 +48,12 @@ impl Template {
         Template::teach_in_part(name, image, None, region, source, options)
     }
 
-    /// The same of a picture that is hidden where `hidden` is lit, as a part that was cut out in an editor: nothing
-    /// is learnt there. Visible levels are carried on behind the rim, so that the rim itself makes no edge, and an
-    /// edge along it is kept.
+    /// The same for a picture that is hidden where `hidden` is set, such as a part that was cut out in an editor:
+    /// nothing is learnt there. Visible grey levels continue behind the rim, so that the rim itself makes no edge but
+    /// an edge along it is preserved.
     ///
     /// # Errors
-    /// As [`Template::teach`].
+    /// Those of [`Template::teach`].
     pub fn teach_in_part(
         name: &str,
         image: &Image,
@@ -89,7 +89,7 @@ impl Template {
         })
     }
 
-    /// Parses a file and checks every number of it.
+    /// Parses a file and checks every number in it.
     ///
     /// # Errors
     /// Text that is no template, and numbers that no picture gives.

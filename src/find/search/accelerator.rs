@@ -1,5 +1,6 @@
-//! In: a level and the places of a model's features at every turn. Out: the peaks of their sums, computed by WGSL
-//! stages; the same numbers as the CPU's. Frame and unit: strided places of the level; a perfect feature scores 4.
+//! In: a level and the positions of a model's features at every turn. Out: the peaks of their sums, computed by WGSL
+//! stages; the same numbers as the CPU's.
+//! Frame and unit: strided places of the level; a perfect feature scores 4.
 
 use super::level::{Level, Placed};
 use crate::fault::{Fault, Result};
@@ -16,23 +17,23 @@ pub struct Accelerator {
     spread: Pipeline,
     score: Pipeline,
     peaks: Pipeline,
-    /// What decides whether a search runs here; `None`: every search that fits.
+    /// Decides whether a search runs on the GPU; `None`: every search that fits.
     pub rule: Option<Rule>,
 }
 
-/// What a search costs here and on the CPU, measured on this machine.
+/// What a search costs on the GPU and on the CPU, measured on this machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rule {
     /// Submissions and readback of one search, s.
     pub fixed_s: f64,
-    /// One addition of a feature's response to a place's sum, s.
+    /// One addition of a feature's response to a place's sum on the GPU, s.
     pub here_s: f64,
     /// The same addition on the CPU, s.
     pub cpu_s: f64,
 }
 
 impl Rule {
-    /// Whether a search of so many additions takes no longer here than on the CPU.
+    /// Whether a search with this number of additions takes no longer on the GPU than on the CPU.
     pub fn pays(&self, additions: u64) -> bool {
         self.fixed_s + self.here_s * additions as f64 <= self.cpu_s * additions as f64
     }
@@ -44,11 +45,11 @@ impl std::fmt::Debug for Accelerator {
     }
 }
 
-/// Sums of one submission, bytes: 64 MiB fits every adapter's smallest promised binding of 128 MiB.
+/// Size of the sums of one submission, bytes: 64 MiB fits every adapter's smallest guaranteed binding of 128 MiB.
 const SUMS: usize = 64 << 20;
-/// Hits of one submission.
+/// Most hits of one submission.
 const CAPACITY: u32 = 1 << 18;
-/// Level and turns by which the rule is measured: 320 x 320 cells give 6400 places, 32 features a turn.
+/// Level and turns with which the rule is measured: 320 x 320 cells give 6400 places, 32 features a turn.
 const TRIAL: usize = 320;
 const TRIAL_FEATURES: usize = 32;
 const TRIAL_TURNS: [usize; 2] = [8, 72];
@@ -56,8 +57,8 @@ const TRIAL_RUNS: usize = 3;
 const TRIAL_ROUNDS: usize = 4;
 
 impl Accelerator {
-    /// The best adapter if it is a GPU, with the rule of this machine. A software adapter runs the sums on the very
-    /// cores that the CPU's own code would use: it is not even measured.
+    /// The best adapter if it is a GPU, with the rule measured on this machine. A software adapter would run the sums
+    /// on the same cores as the CPU's own code: it is not even measured.
     pub fn open() -> Option<Accelerator> {
         let device = Device::open().ok().filter(|d| d.info.kind != "CPU")?;
         let mut accelerator = Accelerator::on(&device).ok()?;
@@ -65,7 +66,7 @@ impl Accelerator {
         Some(accelerator)
     }
 
-    /// Any adapter, for every search that fits: for tests and benches.
+    /// Any adapter, used for every search that fits: for tests and benches.
     pub fn on(device: &Device) -> Result<Accelerator> {
         Ok(Accelerator {
             device: device.clone(),
@@ -83,12 +84,12 @@ impl Accelerator {
         fits && self.rule.is_none_or(|r| r.pays(features as u64 * u64::from(frame.columns * frame.rows)))
     }
 
-    /// Times the same small searches here and on the CPU. Here the slope is an addition's cost, what is left is
-    /// fixed; on the CPU nothing is.
+    /// Times the same small searches on the GPU and on the CPU. On the GPU, the slope is an addition's cost and the
+    /// rest is fixed; on the CPU nothing is fixed.
     pub fn measured(&self) -> Result<Rule> {
         let level = Level::trial(TRIAL);
         let placed = TRIAL_TURNS.map(|turns| Level::trial_turns(turns, TRIAL_FEATURES));
-        // No sum reaches this: what is timed is the additions, not the peaks of a pattern.
+        // No sum reaches this: only the additions are timed, not the peaks of a pattern.
         const LEAST: u8 = u8::MAX;
         self.peaks(&level, &placed[0], LEAST)?;
         let best = |work: &dyn Fn() -> Result<()>| -> Result<f64> {
@@ -106,7 +107,7 @@ impl Accelerator {
             drop(level.peaks(&placed[1], LEAST));
             Ok(())
         })? / additions[1];
-        // Where more work took no longer, or so much longer that less would take none, something else had the
+        // If more work took no longer, or so much longer that no fixed cost remains, something else occupied the
         // processors.
         for _ in 0..TRIAL_ROUNDS {
             let few = best(&|| self.peaks(&level, &placed[0], LEAST).map(drop))?;

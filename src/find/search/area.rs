@@ -1,5 +1,5 @@
-//! In: where in a scene parts may lie, as corners. Out: the cells that a search there needs, and whether a match lies
-//! in it.
+//! In: where in a scene parts may lie, as corners of a polygon. Out: the cells that a search there needs, and whether a
+//! match lies in it.
 //! Frame and unit: pixels of the scene, an integer is a pixel's centre.
 
 use super::options::SearchOptions;
@@ -14,18 +14,18 @@ pub struct Area {
     corners: Vec<[f64; 2]>,
 }
 
-/// Corners of a polygon that a person draws.
+/// Most corners of a polygon that a user draws.
 const MOST_CORNERS: usize = 1000;
-/// How far around a match's edges the search looks, px: slopes, spreading, refinement.
+/// Border around a match's edges that the search reads, px: slopes, spreading, refinement.
 const BORDER_PX: f64 = 16.0;
-/// The crop begins at a multiple of this, so that its pyramid's cells are those of the whole scene's.
+/// The crop starts at a multiple of this, so that its pyramid has the same cells as the whole scene's.
 const ALIGNED: usize = 256;
 
 impl Area {
-    /// Three corners or more, finite, not all on a line.
+    /// An area with three corners or more, finite, not all on a line.
     ///
     /// # Errors
-    /// Other corners.
+    /// Any other corners.
     pub fn polygon(corners: Vec<[f64; 2]>) -> Result<Area> {
         let bad = |what: String| {
             Fault::usage(what)
@@ -60,7 +60,7 @@ impl Area {
         Area::polygon(vec![[x0, y0], [x0 + width, y0], [x0 + width, y0 + height], [x0, y0 + height]])
     }
 
-    /// Whether a place lies inside, by how often a line to its right crosses the border.
+    /// Whether a place lies inside, by the number of times that a line to its right crosses the border.
     pub fn contains(&self, [x, y]: [f64; 2]) -> bool {
         let around = self.corners.iter().zip(self.corners.iter().cycle().skip(1));
         let crossed =
@@ -74,10 +74,10 @@ impl Area {
         self.contains([x, y])
     }
 
-    /// The cells that a match with its middle here can touch.
+    /// The cells that a match with its middle in this area can touch.
     ///
     /// # Errors
-    /// An area beside the scene.
+    /// An area outside the scene.
     pub(super) fn cells(&self, scene: &Scene, model: &ShapeModel, options: &SearchOptions) -> Result<Region> {
         let reach = options.scales[1] * model.half_size[0].hypot(model.half_size[1]) + BORDER_PX;
         let along = |k: usize, size: usize| {

@@ -1,5 +1,5 @@
-//! In: the directions of one pyramid level, a model's points there and a pose. Out: how well they meet, and the best
-//! pose around it, by steps of a cell and of as much turn.
+//! In: the directions of one pyramid level, a model's points there and a pose. Out: how well they agree, and the best
+//! pose around it, by steps of one cell and of a corresponding turn.
 //! Frame and unit: pixels of the scene in poses, cells of the level inside; scores from 0 to 1.
 
 use super::options::SearchOptions;
@@ -10,14 +10,14 @@ use crate::find::scene::{Kind, to_level};
 use glam::Vec2;
 use rayon::prelude::*;
 
-/// Directions of a level, unit length, 0 where weak or unseen.
+/// Directions of a level, unit length; 0 where weak or unseen.
 pub(in crate::find) struct Directions {
     pub kind: Kind,
     pub field: Field,
     pub threshold: f32,
     ux: Vec<f32>,
     uy: Vec<f32>,
-    /// False where every cell but those of the border is seen.
+    /// False where every cell except those at the border is seen.
     pub gaps: bool,
 }
 
@@ -26,7 +26,7 @@ const BORDER: i64 = 2;
 
 impl Directions {
     pub fn new(kind: Kind, field: Field, threshold: f32) -> Directions {
-        // Squares instead of hypot: slopes are far from where their squares leave the range of f32.
+        // Squares instead of hypot: the squares of slopes stay well within the range of f32.
         let least = threshold * threshold;
         let (mut ux, mut uy) = (vec![0f32; field.gx.len()], vec![0f32; field.gx.len()]);
         let out = ux.par_chunks_mut(field.width).zip(uy.par_chunks_mut(field.width));
@@ -53,9 +53,9 @@ pub(in crate::find) struct Candidate {
     pub score: f64,
 }
 
-/// Mean cosine between model and scene with the nearest cells of a level, and the share of places seen.
-/// A place on a missing cell counts half a miss: a shadow says nothing about an edge, but a pose that
-/// needs many shadows is the worse explanation. Outside the scene or without contrast is a whole miss.
+/// Mean cosine between the model and the nearest cells of a level, and the share of places seen. A place on a missing
+/// cell counts as half a miss: a shadow gives no information about an edge, but a pose that needs many shadows is the
+/// worse explanation. A place outside the scene or without contrast is a full miss.
 pub(in crate::find) fn score(
     layers: &[Directions],
     points: &[ModelPoint],
@@ -80,7 +80,7 @@ impl<const ROWS: usize, const LANES: usize> Around<ROWS, LANES> {
     fn new(layers: &[Directions], points: &[ModelPoint], level: usize, pose: &Pose, ignore: bool) -> Self {
         let (s, c) = pose.angle.sin_cos();
         let reach = (ROWS / 2) as i64;
-        // The cell whose centre is nearest, of the shift with the smallest row and column.
+        // The nearest cell, for the shift with the smallest row and column.
         let first = 0.5 - reach as f64;
         let (cx, cy) = (to_level(pose.x, level) + first, to_level(pose.y, level) + first);
         let k = pose.scale / (1u64 << level) as f64;
@@ -163,9 +163,9 @@ impl<const ROWS: usize, const LANES: usize> Around<ROWS, LANES> {
     }
 }
 
-/// Other hills near a pose, by whole cells at its turn: beside a step of height lies a shadow, whose cells count
-/// half, so a pose as far off as a shadow is wide stands on a hill of its own, and climbing from the coarser level
-/// may end on that one.
+/// Other local maxima near a pose, at its turn, by whole cells. Beside a step of height lies a shadow, whose cells
+/// count half. A pose that is off by the width of a shadow is therefore a local maximum, and climbing from the coarser
+/// level may end there.
 pub(in crate::find) fn hills(
     layers: &[Directions],
     points: &[ModelPoint],
@@ -208,14 +208,14 @@ pub(in crate::find) fn climb(
     let turn = 1.0 / (from.pose.scale * radius / px).max(4.0);
     let ignore = options.ignore_polarity;
     let turned = |pose: &Pose, by: i32| Pose { angle: pose.angle + f64::from(by) * turn, ..*pose };
-    // A step out of the range is not taken.
+    // Steps out of the range are not taken.
     let turns = |from: &Pose| {
         let from = *from;
         (-1..=1).map(move |by| turned(&from, by)).filter(|pose| options.holds_angle(pose.angle, 1e-9))
     };
     let mut best = Candidate { score: score(layers, points, level, &from.pose, ignore).0, pose: from.pose };
     if first {
-        // The coarse grid is STRIDE px wide and the turns as far apart: look around once.
+        // The coarse grid is STRIDE px wide and the turns are as far apart: a wider neighbourhood is searched once.
         for pose in turns(&from.pose) {
             let found = Around::<5, 8>::new(layers, points, level, &pose, ignore).best(&pose, px);
             if found.score > best.score {

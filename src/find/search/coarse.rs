@@ -8,18 +8,18 @@ use crate::find::model::shape_model::{ModelPoint, thin};
 use crate::stages::shape::frame::{BINS, STRIDE};
 use crate::stages::shape::sums::Peak;
 
-/// A perfect feature. 63 features of 4 fill an 8-bit sum.
+/// Score of a perfect feature. 63 features of 4 fill an 8-bit sum.
 pub const FULL: u8 = 4;
-/// Most features of a model that are summed.
+/// Most features of a model that enter a sum.
 pub const MAX_FEATURES: usize = 63;
 
-/// The nearest of 16 directions.
+/// Index of the nearest of 16 directions.
 pub fn bin(gx: f64, gy: f64) -> usize {
     let turn = gy.atan2(gx) / std::f64::consts::TAU * BINS as f64;
     turn.round().rem_euclid(BINS as f64) as usize % BINS
 }
 
-/// A coarse hit: pixels of the level, index of the pose, and the share of the full score.
+/// A hit of the coarse search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Column, px of the level.
@@ -41,10 +41,10 @@ pub struct Turn {
     pub scale: f64,
 }
 
-/// What is asked of a level.
+/// What is searched on a level.
 #[derive(Clone, Copy, Debug)]
 pub struct Query<'a> {
-    /// Edge places of the level, in px of level 0.
+    /// Edge points of the level, in px of level 0.
     pub model: &'a [ModelPoint],
     /// Every turn and scale to be tried.
     pub turns: &'a [Turn],
@@ -52,20 +52,20 @@ pub struct Query<'a> {
     pub px: f64,
     /// Least share of the full score.
     pub limit: f32,
-    /// Most hits, none within one place and `apart` rad of a better one.
+    /// Most hits; none lies within one place and `apart` rad of a better one.
     pub most: usize,
-    /// Hits of one place that are turned by less are one, rad.
+    /// Hits at one place whose turns differ by less than this count as one, rad.
     pub apart: f64,
 }
 
 impl Level {
-    /// Hits above the limit, best first, the same wherever the sums are computed.
+    /// Hits above the limit, best first; the same on the GPU and on the CPU.
     pub fn search(&self, query: &Query, accelerator: Option<&Accelerator>) -> Vec<Hit> {
         let features = thin(query.model, 1.5 * query.px, MAX_FEATURES);
         let placed: Vec<Vec<Placed>> = query.turns.iter().map(|t| self.place(&features, t, query.px)).collect();
         let full = (placed.first().map_or(0, Vec::len) * FULL as usize).max(1) as f32;
         let least = ((query.limit * full).ceil() as u8).max(1);
-        // An adapter that fails, or whose list overflows, leaves the work to the CPU.
+        // If an adapter fails, or its list overflows, the CPU does the work.
         let found = accelerator
             .filter(|a| a.pays(&self.frame, &placed))
             .and_then(|a| a.peaks(self, &placed, least).ok().flatten())

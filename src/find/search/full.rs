@@ -1,5 +1,5 @@
-//! In: a scene, a shape model, what is allowed. Out: matches with score, runner-up, sigma and warnings,
-//! by a pyramid search over quantised directions, then directions, then least squares (\[steger02\]).
+//! In: a scene, a shape model, search options. Out: matches with score, runner-up, sigma and warnings, by a pyramid
+//! search over quantised directions, then directions, then least squares (\[steger02\]).
 //! Frame and unit: pixels of the scene, degrees in options, radians in poses.
 
 use super::accelerator::Accelerator;
@@ -16,48 +16,49 @@ use crate::find::scene::{Kind, Scene, from_level};
 use crate::stages::shape::frame::STRIDE;
 use rayon::prelude::*;
 
-/// A model that reaches farther than this many times the map is not searched: no place of it has half of its edges
-/// there, and turns and memory grow with its reach.
+/// A model that reaches farther than this many times the map's diagonal is not searched: at no pose does the map hold
+/// half of its edges, and turns and memory grow with its reach.
 const MOST_ACROSS: f64 = 4.0;
 
-/// Rounding moves what is held at a limit of its range by less (rad, share of the scale): the limit itself lies inside.
+/// Tolerance at the limits of a range (rad, share of the scale). Rounding moves a value that is fixed at a limit by
+/// less, so the limit itself lies inside.
 const HAIR: f64 = 1e-9;
 
-/// A found instance.
+/// A match.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Match {
-    /// Place (px of the scene), turn (rad) and scale.
+    /// Position (px of the scene), turn (rad) and scale.
     pub pose: Pose,
-    /// Mean cosine between directions; weak places count 0, places on missing cells half.
+    /// Mean cosine between directions; places of weak contrast count 0, places on missing cells half.
     pub score: f64,
-    /// Share of the model's places whose slope could be known at all.
+    /// Share of the model's places whose slope is known.
     pub coverage: f64,
-    /// The best score of another pose in the same place (turned, or shifted by less than the part), 0 for none.
+    /// The best score of another pose in the same place (turned, or shifted by less than the part); 0 if there is none.
     pub second_score: f64,
-    /// Standard deviations of x, y, angle and scale.
+    /// Standard deviations of x and y, px.
     pub sigma_px: [f64; 2],
-    /// Of x and y, mm; `None` for a scene without scale.
+    /// Standard deviations of x and y, mm; `None` for a scene without scale.
     pub sigma_mm: Option<[f64; 2]>,
-    /// Of the turn, degrees.
+    /// Standard deviation of the turn, degrees.
     pub sigma_deg: f64,
-    /// Of the scale, as a share of it; 0 where the scale was given.
+    /// Standard deviation of the scale, as a share of it; 0 where the scale was given.
     pub sigma_scale: f64,
-    /// Edges that the least squares used, and the robust deviation from them, px.
+    /// Number of edges that the least squares used.
     pub edges: usize,
     /// Robust deviation of these edges, px.
     pub edge_rms_px: f64,
     /// Other poses in the same place with their scores, best first, at most eight.
     pub rivals: Vec<(Pose, f64)>,
-    /// What fits almost as well, in words.
+    /// A rival that fits almost as well, in words.
     pub warning: Option<String>,
 }
 
-/// Finds the model in the scene, best first. An empty list is an answer: nothing scored above the least.
+/// Finds the model in the scene, best match first. An empty list means that nothing reached the least score.
 pub fn find(scene: &Scene, model: &ShapeModel, options: &SearchOptions) -> Result<Vec<Match>> {
     find_on(scene, model, options, None)
 }
 
-/// As [`find`], with the coarse search on a GPU where it pays; the matches are the same.
+/// Like [`find`], with the coarse search on a GPU where it pays; the matches are the same.
 pub fn find_on(
     scene: &Scene,
     model: &ShapeModel,
@@ -67,7 +68,7 @@ pub fn find_on(
     find_in(scene, model, options, None, accelerator)
 }
 
-/// As [`find_on`], among places whose middle lies in an area; no more of the scene is looked at than that needs.
+/// Like [`find_on`], for matches whose middle lies in an area; only the part of the scene that this needs is searched.
 pub fn find_in(
     scene: &Scene,
     model: &ShapeModel,
@@ -154,7 +155,7 @@ fn search(
     Ok(finish(scene, &levels[0], model, candidates, options, inside))
 }
 
-/// The best candidates' rivals across a shadow, each climbed to its top.
+/// The best candidates' rivals across a shadow, each climbed to its local maximum.
 fn beside_shadows(
     layers: &[Directions],
     model: &ShapeModel,
@@ -162,7 +163,7 @@ fn beside_shadows(
     candidates: &[Candidate],
     options: &SearchOptions,
 ) -> Vec<Candidate> {
-    /// So many candidates are looked around at: more than the turns at which most parts look nearly alike.
+    /// Number of candidates that are examined: more than the turns at which most parts look nearly alike.
     const LEADING: usize = 8;
     let points = &model.levels[level];
     let leading = candidates[..candidates.len().min(LEADING)].par_iter();
@@ -172,22 +173,21 @@ fn beside_shadows(
         .collect()
 }
 
-/// Three times the noise, but not below a thousandth of the layer's strong slopes: a noise-free picture
-/// has rounding errors for edges otherwise.
+/// Contrast threshold: three times the noise, but not below a thousandth of the layer's strong slopes. Otherwise a
+/// noise-free picture would have rounding errors for edges.
 fn automatic(field: &Field) -> f32 {
     let step = (field.gx.len() / 20_000).max(1);
     let mut m: Vec<f32> = (0..field.gx.len()).step_by(step).map(|i| field.magnitude(i)).collect();
     let top = m.len() * 99 / 100;
     let strong = *m.select_nth_unstable_by(top, f32::total_cmp).1;
-    // In a picture that is edges everywhere the lower quartile is no noise: a fifth of the strong slopes
-    // bounds it.
+    // In a picture full of edges, the lower quartile is not noise: a fifth of the strong slopes bounds it.
     (3.0 * field.noise()).min(0.2 * strong).max(1e-3 * strong).max(1e-6)
 }
 
-/// Smaller than this (half diagonal, px of the level) a part has too few cells to be told from anything else.
+/// A part smaller than this (half diagonal, px of the level) has too few cells to be recognised.
 const SMALLEST: f64 = 10.0;
 
-/// Of a range of scales those that are first looked for on this level: the coarsest that shows a part of their size.
+/// The scales of a range whose search starts on this level: it is the coarsest that shows a part of their size.
 fn sizes_from(model: &ShapeModel, level: usize, most: usize, [s0, s1]: [f64; 2]) -> Option<[f64; 2]> {
     let half = model.half_size[0].hypot(model.half_size[1]);
     let shown = |level: usize| SMALLEST * (1u64 << level) as f64 / half;
@@ -231,7 +231,7 @@ fn coarse_candidates(
     let ignore = options.ignore_polarity || model.levels[level].iter().all(|p| p.either);
     let coarse = Level::new(&inputs, ignore, (0.5 * model.radius / px) as usize);
     let apart = 2.0 * (STRIDE as f64 * 0.5) / (sizes[1] * model.radius / px).max(4.0);
-    // Spreading only raises a score, quantising costs up to a quarter of it.
+    // Spreading only raises a score; quantising costs up to a quarter of it.
     let limit = (0.75 * (options.min_score - 0.1)).max(0.2) as f32;
     let query = Query { model: &model.levels[level], turns: &turns, px, limit, most: options.candidates, apart };
     coarse
@@ -249,7 +249,7 @@ fn coarse_candidates(
         .collect()
 }
 
-/// Best first, without candidates that climbed to the same pose.
+/// The candidates, best first, without those that climbed to the same pose.
 fn distinct(mut candidates: Vec<Candidate>, px: f64, radius: f64, most: usize) -> Vec<Candidate> {
     candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut kept: Vec<Candidate> = Vec::new();
@@ -282,7 +282,7 @@ fn finish(
         .par_iter()
         .filter_map(|c| {
             let (r, s, coverage) = refined(layers, &fields, model, c, options)?;
-            // The range limits what is returned, not where the search begins.
+            // The range limits what is returned, not where the search starts.
             let slack = |k: usize| HAIR + 3.0 * r.covariance[(k, k)].max(0.0).sqrt();
             if !options.holds_angle(r.pose.angle, slack(2)) || !options.holds_scale(r.pose.scale, slack(3)) {
                 return None;
@@ -340,8 +340,9 @@ fn finish(
     out.into_iter().map(|m| m.1).collect()
 }
 
-/// A candidate refined, with the score and the coverage there. Where cells are missing few edges hold a pose, and
-/// later rounds may walk along them onto a shadow's: then the round that scores best is taken.
+/// Refines a candidate; returns also the score and the coverage there. Where cells are missing, few edges constrain a
+/// pose, and later rounds may drift along them to a shadow's edges. If the last round has left the candidate, the
+/// earlier round with the best score is taken.
 fn refined(
     layers: &[Directions],
     fields: &[(Kind, &Field, f32)],
@@ -358,7 +359,7 @@ fn refined(
     after(ROUNDS).or_else(|| (1..ROUNDS).filter_map(after).max_by(|a, b| a.1.total_cmp(&b.1)))
 }
 
-/// Share of the smaller box that two turned boxes share, by sampling a 9x9 grid of one in the other.
+/// Share of the smaller of two turned boxes that lies in the other, by sampling a 9x9 grid.
 fn overlap(model: &ShapeModel, a: &Pose, b: &Pose) -> f64 {
     let (small, large) = if a.scale <= b.scale { (a, b) } else { (b, a) };
     let (s, c) = large.angle.sin_cos();

@@ -1,5 +1,5 @@
-//! In: slope fields of one pyramid level; where a turned model's features look. Out: the level as the stages see it,
-//! and the peaks of the features' sums on the CPU (quantised and spread as in \[hinterstoisser12\]).
+//! In: slope fields of one pyramid level; the positions of a turned model's features. Out: the level in the form that
+//! the stages use, and the peaks of the features' sums on the CPU (quantised and spread as in \[hinterstoisser12\]).
 //! Frame and unit: cells of the level; scores are integers, 0 to 4 a feature.
 
 use crate::find::model::gradient::Field;
@@ -9,7 +9,7 @@ use crate::stages::shape::maps::{both_polarities, direction, pack, response};
 use crate::stages::shape::sums::{Peak, peaks};
 use rayon::prelude::*;
 
-/// Every cell gets the bits of the window from -STRIDE/2 to STRIDE/2 - 1 around it.
+/// Gives every cell the bits of the window from -STRIDE/2 to STRIDE/2 - 1 around it.
 fn spread(bits: &[u16], width: usize, height: usize) -> Vec<u16> {
     let half = STRIDE / 2;
     let mut rows = vec![0u16; bits.len()];
@@ -29,7 +29,7 @@ fn spread(bits: &[u16], width: usize, height: usize) -> Vec<u16> {
     out
 }
 
-/// A level and its layers as the stages see them.
+/// A level and its layers in the form that the stages use.
 pub struct Level {
     pub(in crate::find) frame: ShapeFrame,
     pub(in crate::find) kinds: Vec<Kind>,
@@ -37,7 +37,7 @@ pub struct Level {
     pub(in crate::find) slopes: Vec<Vec<u32>>,
 }
 
-/// Where a feature looks: the layer, the direction it wants, and its distance from the model's place in cells.
+/// Where a feature is read: the layer, the expected direction, and its offset from the model's place in cells.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::find) struct Placed {
     pub layer: usize,
@@ -47,8 +47,8 @@ pub(in crate::find) struct Placed {
 }
 
 impl Level {
-    /// Prepares the layers of a level; `margin` px around the picture count as empty, so that parts that
-    /// reach beyond the border are found.
+    /// Prepares the layers of a level; `margin` px around the picture count as empty, so that parts that extend beyond
+    /// the border are found.
     pub fn new(layers: &[(Kind, &Field, f32)], ignore_polarity: bool, margin: usize) -> Level {
         let mut frame = ShapeFrame::new(layers[0].1.width, layers[0].1.height, margin);
         frame.ignore = u32::from(ignore_polarity);
@@ -62,13 +62,13 @@ impl Level {
         }
     }
 
-    /// A made-up level of `side` cells, by which the accelerator is timed.
+    /// An artificial level of `side` cells with which the accelerator is timed.
     pub(in crate::find) fn trial(side: usize) -> Level {
         let slopes = (0..side * side).map(|i| pack((i % 7) as f32 - 3.0, (i / side % 5) as f32 - 2.0, 2.0)).collect();
         Level { frame: ShapeFrame::new(side, side, 0), kinds: vec![Kind::Height], slopes: vec![slopes] }
     }
 
-    /// As many features at as many turns, within the trial level's middle.
+    /// The given number of features at the given number of turns, within the trial level's middle.
     pub(in crate::find) fn trial_turns(turns: usize, features: usize) -> Vec<Vec<Placed>> {
         let feature = |t: usize, f: usize| {
             let (s, c) = (0.3 * f as f64 + 0.01 * t as f64).sin_cos();
@@ -100,7 +100,7 @@ impl Level {
         let (columns, plane) = (frame.columns as usize, (frame.columns * frame.rows) as usize);
         let bits: Vec<u16> = slopes.par_iter().map(|&s| direction(s)).collect();
         let bits = spread(&bits, w, h);
-        // The phases of the sets of directions first: each direction's responses are then made in one go.
+        // The phases of the direction sets come first: each direction's responses are then computed in one pass.
         let mut phases = vec![0u16; STRIDE * STRIDE * plane];
         phases.par_chunks_mut(plane).enumerate().for_each(|(phase, of_phase)| {
             // The first row and column of the picture in this phase, and where it lies in the plane.
@@ -123,7 +123,7 @@ impl Level {
         cells
     }
 
-    /// The sum of every strided place for one turn.
+    /// The sums at all strided places for one turn.
     fn scores(&self, memories: &[Vec<u8>], features: &[Placed], sums: &mut Vec<u8>) {
         let (columns, rows) = (self.frame.columns as i64, self.frame.rows as i64);
         let plane = (columns * rows) as usize;

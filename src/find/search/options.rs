@@ -1,4 +1,4 @@
-//! In: what a person or a recipe asks of the search. Out: the same, checked.
+//! In: what a user or a recipe requests of the search. Out: the same, checked.
 //! Frame and unit: degrees, scores from 0 to 1, values per pixel of the layer.
 
 use crate::fault::{Fault, Result};
@@ -17,7 +17,7 @@ pub struct SearchOptions {
     pub max_matches: usize,
     /// Largest overlap of two matches, 0 to 1, as a share of the smaller one's box.
     pub max_overlap: f64,
-    /// Takes dark-to-bright for bright-to-dark.
+    /// Accepts dark-to-bright edges for bright-to-dark ones, and the reverse.
     pub ignore_polarity: bool,
     /// Weakest edge, in values per px of the layer; `None` for three times the noise.
     pub min_contrast: Option<f64>,
@@ -27,16 +27,16 @@ pub struct SearchOptions {
     pub candidates: usize,
 }
 
-/// What the least squares may change beside the place.
+/// What the least squares may change besides the position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Free {
-    /// The turn.
+    /// Whether the turn may change.
     pub angle: bool,
-    /// The scale.
+    /// Whether the scale may change.
     pub scale: bool,
 }
 
-/// Candidates where several matches are wanted.
+/// Number of candidates where several matches are wanted.
 const SEVERAL: usize = 2000;
 
 impl Default for SearchOptions {
@@ -62,7 +62,7 @@ impl SearchOptions {
     /// Whether a turn (rad) lies in the range, or outside by no more than `slack` (rad).
     pub(super) fn holds_angle(&self, angle: f64, slack: f64) -> bool {
         let [first, last] = self.angles_deg.map(f64::to_radians);
-        // So much slack that every turn is held, infinite where nothing tells the turn.
+        // With enough slack every turn is held; the slack is infinite where the turn is undetermined.
         let width = last - first + 2.0 * slack;
         width >= std::f64::consts::TAU || (angle - first + slack).rem_euclid(std::f64::consts::TAU) <= width
     }
@@ -73,21 +73,21 @@ impl SearchOptions {
         (least - slack..=most + slack).contains(&scale)
     }
 
-    /// Whether turn and scale are measured: of a range of one value both ends are what they are said to be.
+    /// Whether turn and scale are measured: a range of a single value fixes them.
     pub(super) fn free(&self) -> Free {
         Free { angle: self.angles_deg[1] > self.angles_deg[0], scale: self.scales[1] > self.scales[0] }
     }
 
-    /// The same for up to so many matches: of several, weaker candidates are carried on too.
+    /// The same options for at most this number of matches; for several, weaker candidates are carried along too.
     pub fn at_most(self, matches: usize) -> SearchOptions {
         let candidates = if matches > 1 { SEVERAL } else { self.candidates };
         SearchOptions { max_matches: matches, candidates, ..self }
     }
 
-    /// A turn (rad) in degrees within the range that was asked for: 350 of 0..360, -10 of -180..180.
+    /// A turn (rad) in degrees within the requested range: 350 of 0..360, -10 of -180..180.
     pub fn turn_deg(&self, angle: f64) -> f64 {
         let first = self.angles_deg[0];
-        // A turn that is held may lie below the first by a rounding error.
+        // By rounding, a turn that is held may lie slightly below the first.
         first - 1.0 + (angle.to_degrees() - first + 1.0).rem_euclid(360.0)
     }
 
@@ -136,7 +136,7 @@ mod tests {
         assert!([-5.0, 5.0, 355.0, 725.0].iter().all(|&d| holds(&five, d, 1e-9)));
         assert!([-5.1, 5.1, 180.0].iter().all(|&d| !holds(&five, d, 1e-9)) && holds(&five, 5.1, 0.002));
         assert!(holds(&range(170.0, 190.0), -175.0, 0.0) && holds(&range(30.0, 30.0), 390.0, 1e-9));
-        // A round part: its turn is anything, which is no reason not to have found it.
+        // A round part: its turn is arbitrary, which must not reject it.
         assert!(holds(&five, 180.0, f64::INFINITY) && holds(&five, 90.0, 3.5) && !holds(&five, 90.0, 1.0));
         let small = SearchOptions { scales: [0.9, 1.1], ..SearchOptions::default() };
         assert!(small.holds_scale(1.1, 1e-9) && !small.holds_scale(1.2, 0.05) && small.holds_scale(3.0, f64::INFINITY));

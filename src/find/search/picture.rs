@@ -7,7 +7,7 @@ use super::refine::Pose;
 use crate::find::model::shape_model::ShapeModel;
 use crate::raster::{Image, Rgb, RgbImage};
 
-/// Ways that tell neighbours apart, on grey.
+/// Colours that distinguish neighbouring matches, on grey.
 const COLOURS: [Rgb; 6] =
     [[60, 255, 60], [255, 200, 40], [80, 200, 255], [255, 90, 220], [255, 120, 60], [180, 255, 220]];
 /// Half an arm of the cross at the reference point, px.
@@ -32,7 +32,7 @@ pub fn draw(image: &Image, model: &ShapeModel, matches: &[Match]) -> RgbImage {
     out
 }
 
-/// Draws a template's edges where they were taught; `reference` is where its reference point lies, px.
+/// Draws a template's edges where they were taught; `reference` is the position of its reference point, px.
 pub fn draw_model(image: &Image, model: &ShapeModel, reference: [f64; 2]) -> RgbImage {
     let mut out = RgbImage::from_grey(image);
     edges(&mut out, model, &Pose { x: reference[0], y: reference[1], angle: 0.0, scale: 1.0 }, COLOURS[0]);

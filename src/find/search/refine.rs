@@ -8,7 +8,7 @@ use crate::find::model::shape_model::{ModelPoint, ShapeModel, ridge_offset};
 use crate::find::scene::Kind;
 use nalgebra::{Matrix4, Vector4};
 
-/// Where the model's reference point lies in the scene, its turn (x towards y) and its scale.
+/// Position of the model's reference point in the scene, its turn (x towards y) and its scale.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Pose {
     /// Column of the reference point, px.
@@ -22,7 +22,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// A model place and direction in the scene.
+    /// A model point and its direction in the scene.
     pub fn place(&self, p: &ModelPoint) -> (f64, f64, f64, f64) {
         let (s, c) = self.angle.sin_cos();
         (
@@ -42,25 +42,25 @@ impl Pose {
 /// A refined pose.
 #[derive(Clone, Copy, Debug)]
 pub struct Refined {
-    /// By least squares, in px of the scene and rad.
+    /// The least-squares pose, in px of the scene and rad.
     pub pose: Pose,
-    /// Over x px, y px, angle rad, scale.
+    /// Covariance over x px, y px, angle rad, scale.
     pub covariance: Matrix4<f64>,
-    /// Edges that took part.
+    /// Number of edges that were used.
     pub used: usize,
     /// Robust standard deviation of the distances, px.
     pub rms_px: f64,
 }
 
-/// Farthest that an edge is looked for along its normal, px.
+/// Largest distance along its normal at which an edge is searched, px.
 const REACH: i64 = 3;
 /// Residuals beyond this many robust sigmas have no weight (Tukey).
 const TUKEY: f64 = 4.0;
-/// Sigma never falls below this: the interpolation error of one edge, px.
+/// Lower limit of sigma: the interpolation error of one edge, px.
 const FLOOR_PX: f64 = 0.02;
 
-/// Refines by at most `rounds` rounds of matching and solving. `None` where fewer edges than unknowns
-/// remain or the geometry leaves a motion free.
+/// Refines by at most `rounds` rounds of matching and solving. `None` where fewer edges than twice the unknowns remain,
+/// or the geometry leaves a motion undetermined.
 pub fn refine(
     fields: &[(Kind, &Field, f32)],
     model: &ShapeModel,
@@ -80,8 +80,8 @@ pub fn refine(
             return None;
         }
         let (step, covariance, sigma) = solve(&rows, free)?;
-        // Edges were looked for within REACH: a longer step is an extrapolation along a motion that few of them hold,
-        // as where a shadow hides the edges across it. The next round looks from where this one could see.
+        // Edges were searched within REACH. A longer step is an extrapolation along a motion that few edges constrain,
+        // as where a shadow hides the edges across it. The next round searches from the shortened step.
         let longest = step.x.hypot(step.y) + model.radius * (step.z.abs() + step.w.abs());
         let step = step * (REACH as f64 / longest).min(1.0);
         pose.x += step.x;
@@ -107,7 +107,7 @@ fn row(fields: &[(Kind, &Field, f32)], p: &ModelPoint, pose: &Pose, ignore: bool
             *v = if ignore || p.either { g.abs() } else { g };
         }
     }
-    // The ridge nearest to the model's own place, so that parallel edges do not attract.
+    // The ridge nearest to the model point is used, so that parallel edges do not attract.
     let mut best: Option<f64> = None;
     for i in 1..along.len() - 1 {
         if along[i] > f64::from(*threshold)
@@ -152,7 +152,7 @@ fn solve(rows: &[(Vector4<f64>, f64)], free: Free) -> Option<(Vector4<f64>, Matr
             a[(k, k)] = 1.0;
             b[k] = 0.0;
         }
-        // Scaled to unit diagonal, a free motion shows as a tiny eigenvalue.
+        // After scaling to unit diagonal, an undetermined motion shows as a tiny eigenvalue.
         let scale = Vector4::from_fn(|k, _| a[(k, k)].max(1e-300).sqrt().recip());
         let unit = Matrix4::from_fn(|i, k| a[(i, k)] * scale[i] * scale[k]);
         if unit.symmetric_eigenvalues().min() < 1e-6 {
@@ -178,8 +178,8 @@ mod tests {
     use crate::find::model::shape_model::ModelOptions;
     use crate::find::scene::Layer;
 
-    /// A plate whose upper and lower edges lie in shadow, half a cell narrower than drawn: its nearly parallel sides
-    /// alone hold it along them, and meet their edges 20 px away.
+    /// A plate, half a cell narrower than drawn, whose upper and lower edges lie in shadow. Only its nearly parallel
+    /// sides constrain it along them, and these would meet their edges 20 px away.
     #[test]
     fn a_step_is_never_longer_than_edges_were_looked_for() {
         let drawing =

@@ -17,12 +17,12 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Whole numbers have no value of their own for "not measured".
+    /// True for whole numbers, which have no special value for "not measured".
     pub fn whole(self) -> bool {
         matches!(self, Kind::Unsigned(_) | Kind::Signed(_))
     }
 
-    /// The largest number of a kind without a sign.
+    /// The largest number of an unsigned kind.
     pub fn most(self) -> Option<f64> {
         match self {
             Kind::Unsigned(bits) => Some(2f64.powi(i32::from(bits)) - 1.0),
@@ -30,7 +30,7 @@ impl Kind {
         }
     }
 
-    /// Whether `sample` is what a file of this kind holds for `number`: -99.9999 is stored in 32 bits as -99.99990082.
+    /// Whether `sample` is what a file of this kind stores for `number`: -99.9999 is stored in 32 bits as -99.99990082.
     pub fn same(self, sample: f64, number: f64) -> bool {
         match self {
             Kind::Float(16) => sample == in_half(number),
@@ -41,7 +41,7 @@ impl Kind {
     }
 }
 
-/// The nearest number of 16-bit floating point (10 bits behind the point), as a 64-bit one.
+/// The nearest number of 16-bit floating point (10 bits of fraction), as a 64-bit one.
 fn in_half(number: f64) -> f64 {
     let exponent = number.abs().log2().floor().clamp(-14.0, 16.0);
     let step = (exponent - 10.0).exp2();
@@ -91,7 +91,7 @@ impl Values {
         }
     }
 
-    /// Takes the samples at `from`, in that order.
+    /// The samples at the indices `from`, in that order.
     pub fn picked(&self, from: impl Iterator<Item = usize>) -> Values {
         match self {
             Values::U8(v) => Values::U8(from.map(|i| v[i]).collect()),

@@ -1,4 +1,4 @@
-//! Reads the samples of a picture file as they are written, and what the file itself says about them.
+//! Reads the samples of a picture file as they are written, and what the file itself states about them.
 
 mod kind;
 mod other;

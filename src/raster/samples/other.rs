@@ -11,14 +11,14 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     let strange = |e: &dyn std::fmt::Display| unreadable(bytes, e);
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| strange(&e))?;
     let format = reader.format();
-    // The size is judged here, by its own numbers.
+    // The size is checked here, against the limits of this program.
     reader.no_limits();
     let mut decoder = reader.into_decoder().map_err(|e| strange(&e))?;
     let (width, height) = decoder.dimensions();
     let orientation = decoder.orientation().map_or(1, |o| u16::from(o.to_exif()));
     wanted.fits(orientation, [width, height])?;
     stretched(bytes)?;
-    // The picture, and its samples without alpha.
+    // The picture, and its samples without alpha, are in memory together.
     let _memory = DECODING.hold(3 * decoder.total_bytes());
     let picture = DynamicImage::from_decoder(decoder).map_err(|e| strange(&e))?;
     let says = Says {

@@ -1,12 +1,11 @@
-//! Reads PGM (P5 and P2) with its levels as they are written: other readers stretch a 12-bit sensor's levels to 16
-//! bits.
+//! Reads PGM (P5 and P2) with its levels as written: other readers stretch a 12-bit sensor's levels to 16 bits.
 
 use super::kind::{Kind, Values};
 use super::picture::{Samples, Wanted};
 use super::says::Says;
 use crate::fault::{Fault, Result};
 
-/// Size, largest level and place of the first pixel.
+/// Size, largest level and offset of the first pixel.
 struct Header {
     width: u32,
     height: u32,
@@ -30,12 +29,12 @@ fn header(bytes: &[u8]) -> Option<Header> {
         Some(number)
     };
     let (width, height, most) = (next()?, next()?, next()?);
-    // One blank, then the pixels.
+    // One whitespace byte, then the pixels.
     let good = bytes.get(at)?.is_ascii_whitespace() && width > 0 && height > 0 && (1..=65_535).contains(&most);
     good.then_some(Header { width, height, most, start: at + 1 })
 }
 
-/// Reads a PGM; the levels are not stretched, whatever the largest is said to be.
+/// Reads a PGM; the levels are not stretched, whatever largest level the header states.
 pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     let broken = |what: String| {
         Err(Fault::input(what)
@@ -68,9 +67,9 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     Ok(Samples { width, height, channels: 1, kind, values, hidden: None, veiled: 0, says: Says::default() })
 }
 
-/// The levels of a PGM in words (P2).
+/// The levels of a PGM written as text (P2).
 fn words(text: &[u8], pixels: u64, most: u32) -> Option<Vec<u16>> {
-    // A level has a digit and a blank at least.
+    // A level takes at least a digit and a blank.
     if pixels > text.len() as u64 {
         return None;
     }

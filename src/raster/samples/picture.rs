@@ -11,39 +11,39 @@ use crate::raster::size::fits;
 /// The samples of one picture, upright.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Samples {
-    /// px
+    /// Width, px.
     pub width: u32,
-    /// px
+    /// Height, px.
     pub height: u32,
     /// 1: one number a pixel; 3: red, green and blue.
     pub channels: usize,
-    /// What kind of numbers the file holds.
+    /// Kind of the numbers that the file holds.
     pub kind: Kind,
     pub(in crate::raster) values: Values,
-    /// Pixels that the file hides wholly (alpha 0, a mask), where there are any.
+    /// Pixels that the file hides completely (alpha 0, a mask), if any.
     pub hidden: Option<Mask>,
-    /// Pixels that it hides in part.
+    /// Number of pixels that it hides in part.
     pub veiled: usize,
-    /// What else it says.
+    /// What else the file states.
     pub says: Says,
 }
 
 /// What a reader accepts.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted {
-    /// Width and height, where they are known.
+    /// Width and height, if they are known.
     pub size: Option<[u32; 2]>,
-    /// Most pixels.
+    /// Most pixels that are accepted.
     pub most: u64,
-    /// Which of several pages, from 1 on; `None`: there must be one.
+    /// Page to read of several, from 1 on; `None`: the file must have one page.
     pub page: Option<usize>,
 }
 
-/// Memory for pictures while they are decoded, by all threads together, bytes.
+/// Memory for pictures during decoding, for all threads together, bytes.
 pub(super) static DECODING: Budget = Budget::new(1 << 30);
 
 impl Wanted {
-    /// Refuses a size before anything is decoded; `stored` is turned by `orientation` afterwards.
+    /// Refuses a size before anything is decoded; `stored` is the size before the picture is turned by `orientation`.
     pub(super) fn fits(&self, orientation: u16, stored: [u32; 2]) -> Result<()> {
         let [width, height] = turn::size(orientation, stored);
         let turned = |e: Fault| {
@@ -74,13 +74,13 @@ impl Samples {
         self.width as usize * self.height as usize
     }
 
-    /// Whether no pixel has more than one colour in it: red, green and blue are the same number everywhere.
+    /// Whether no pixel is coloured: red, green and blue are the same number everywhere.
     pub fn grey(&self) -> bool {
         self.channels == 1
             || (0..self.pixel_count()).all(|i| (1..self.channels).all(|c| self.get(i, c) == self.get(i, 0)))
     }
 
-    /// Parts the channel behind the colours, alpha, from them. 0 hides a pixel, `opaque` does not.
+    /// Separates the channel behind the colours, alpha, from them. Alpha 0 hides a pixel, `opaque` does not.
     pub(super) fn parted(mut self, opaque: f64) -> Samples {
         let all = self.channels;
         self.channels -= 1;
@@ -90,7 +90,7 @@ impl Samples {
         self
     }
 
-    /// Takes pixels out of what is seen; `alpha` is 0 for a hidden one and 1 for one that is not.
+    /// Hides pixels; `alpha` is 0 for a hidden one and 1 for a visible one. Values between are counted as veiled.
     pub(super) fn hide(&mut self, alpha: impl Fn(usize) -> f64) {
         let width = self.width as usize;
         let hidden = Mask::from_fn(self.width, self.height, |x, y| alpha(y as usize * width + x as usize) == 0.0);
@@ -98,7 +98,7 @@ impl Samples {
         self.hidden = (hidden.count() > 0).then_some(hidden);
     }
 
-    /// Turns stored samples upright and says so.
+    /// Turns stored samples upright and notes it.
     pub(super) fn upright(mut self, orientation: u16) -> Samples {
         if orientation <= 1 {
             return self;
@@ -110,7 +110,7 @@ impl Samples {
         if let Some(hidden) = self.hidden.take() {
             let mut from = places();
             let at = |i: usize| hidden.get((i % stored[0] as usize) as u32, (i / stored[0] as usize) as u32);
-            // Masks are made row by row, as places come.
+            // Masks are built row by row, in the order of `places`.
             self.hidden = Some(Mask::from_fn(self.width, self.height, |_, _| from.next().is_some_and(at)));
         }
         self.says.orientation = Some(orientation);
@@ -121,7 +121,7 @@ impl Samples {
     }
 }
 
-/// A picture that no reader could take.
+/// The error for a picture that no reader can read.
 pub(super) fn unreadable(bytes: &[u8], e: &dyn std::fmt::Display) -> Fault {
     Fault::input(format!("is not a readable picture ({} bytes): {e}", bytes.len()))
         .cause("the file is truncated, empty, or of a format other than PNG, JPEG, TIFF, BMP and PGM")

@@ -12,13 +12,13 @@ pub(super) const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     let strange = |e: png::DecodingError| unreadable(bytes, &e);
-    // The size is judged here, by its own numbers.
+    // The size is checked here, against the limits of this program.
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: usize::MAX });
     decoder.set_transformations(png::Transformations::IDENTITY);
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
     let [width, height] = <[u32; 2]>::from(decoder.read_header_info().map_err(strange)?.size());
-    // An orientation that comes later may swap columns and rows; any other size is refused before anything is decoded.
+    // An orientation later in the file may swap columns and rows; any other size is refused before anything is decoded.
     let swapped = wanted.size == Some([height, width]);
     wanted.fits(if swapped { 6 } else { 1 }, [width, height])?;
     let mut reader = decoder.read_info().map_err(strange)?;
@@ -35,7 +35,7 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
         reader.next_frame(&mut levels).map_err(strange)?;
         Values::U8(levels)
     };
-    // An eXIf chunk may come after the pixels; a file that ends before its end mark is whole enough without.
+    // An eXIf chunk may follow the pixels; a file that ends before its end mark is complete enough.
     let _ = reader.finish();
     let info = reader.info();
     let orientation = orientation(info);
@@ -44,7 +44,7 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     Ok(samples(info, values)?.upright(orientation))
 }
 
-/// Refuses animations, whose other pictures nobody would look at.
+/// Refuses animations: their other pictures would be ignored.
 fn single(info: &Info) -> Result<()> {
     match info.animation_control {
         Some(control) if control.num_frames > 1 => {
@@ -87,7 +87,7 @@ fn samples(info: &Info, stored: Values) -> Result<Samples> {
         return Ok(samples.parted(opaque));
     }
     if let Some(clear) = &info.trns {
-        // The `png` crate keeps one byte of each level of up to 8 bits.
+        // The `png` crate stores one byte for each level of up to 8 bits.
         let level = |b: &[u8]| f64::from(b.iter().fold(0u16, |v, b| v << 8 | u16::from(*b)));
         let clear: Vec<f64> = clear.chunks_exact(if bits == 16 { 2 } else { 1 }).map(level).collect();
         let there: Vec<f64> = (0..samples.pixel_count())
@@ -98,7 +98,7 @@ fn samples(info: &Info, stored: Values) -> Result<Samples> {
     Ok(samples)
 }
 
-/// Numbers of a palette's colours, with the colours put in their place; a palette of greys makes a grey picture.
+/// Replaces a palette's numbers by the colours; a palette of greys gives a grey picture.
 fn coloured(mut samples: Samples, info: &Info) -> Result<Samples> {
     let palette = info.palette.as_deref().unwrap_or_default();
     let Values::U8(numbers) = &samples.values else { return Ok(samples) };
@@ -121,7 +121,7 @@ fn coloured(mut samples: Samples, info: &Info) -> Result<Samples> {
     Ok(samples)
 }
 
-/// Samples of 1, 2 or 4 bits, the first in the highest bits, each row in whole bytes.
+/// Unpacks samples of 1, 2 or 4 bits; the first is in the highest bits, and each row fills whole bytes.
 pub(super) fn unpacked(raw: &[u8], bits: u8, in_row: usize) -> Vec<u8> {
     let bits = usize::from(bits);
     let stride = (in_row * bits).div_ceil(8);

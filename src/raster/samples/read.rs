@@ -1,4 +1,4 @@
-//! Reads a picture file of any format by what it begins with.
+//! Reads a picture file of any format, recognised by its first bytes.
 
 use super::picture::{Samples, Wanted};
 use super::{other, pgm, png, tiff};
@@ -7,7 +7,7 @@ use crate::fault::{Fault, Result};
 /// Reads the samples of a picture that is held in memory.
 ///
 /// # Errors
-/// Other files, damaged ones, another size, kinds of samples that no reader here knows.
+/// Other files, damaged ones, another size, and kinds of samples that no reader here supports.
 pub fn read_samples(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     let paged = tiff::begins(bytes);
     if let Some(page) = wanted.page.filter(|_| !paged) {

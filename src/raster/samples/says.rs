@@ -1,9 +1,9 @@
-//! What a picture file says about its samples beside the samples themselves.
+//! What a picture file states about its samples.
 
-/// What a file says about its samples; nothing of it is applied to them but the orientation.
+/// Statements of a file about its samples; only the orientation is applied to them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Says {
-    /// Which of the eight orientations of TIFF and Exif the file had; the samples are upright.
+    /// Orientation that the file had, one of the eight of TIFF and Exif; the samples are upright.
     pub orientation: Option<u16>,
     /// The sample of a pixel without a value (GDAL_NODATA).
     pub missing: Option<f64>,
@@ -15,7 +15,7 @@ pub struct Says {
     pub white_is_zero: bool,
     /// Compression changed the samples (JPEG).
     pub lossy: bool,
-    /// A picture of two levels, which are shades and no numbers.
+    /// A picture of two levels, which are shades and not numbers.
     pub two_levels: bool,
     /// Facts that may surprise, a sentence each.
     pub notes: Vec<String>,

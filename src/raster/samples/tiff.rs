@@ -11,7 +11,7 @@ use std::io::Cursor;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::{ByteOrder, Tag};
 
-/// Whether a file begins as a TIFF or BigTIFF of either byte order does.
+/// Whether a file starts like a TIFF or BigTIFF of either byte order.
 pub(super) fn begins(bytes: &[u8]) -> bool {
     [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|mark| bytes.starts_with(*mark))
 }
@@ -88,8 +88,8 @@ fn page(bytes: &[u8], index: usize, wanted: &Wanted) -> Result<Samples> {
     Ok(samples.upright(orientation))
 }
 
-/// The `tiff` crate turns the samples of a picture whose white is 0 round, and reads no palettes and masks. It gets a
-/// copy of the file that says "black is 0", and gives the samples as they are written.
+/// The `tiff` crate inverts the samples of a picture whose white is 0, and reads no palettes or masks. It gets a copy
+/// of the file that states "black is 0", and then returns the samples as written.
 fn as_black_is_zero<'a>(bytes: &'a [u8], file: &mut Decoder<Cursor<&'a [u8]>>, tags: &Tags) -> Result<Cow<'a, [u8]>> {
     if tags.shades == Shades::Rgb || (tags.shades == Shades::Grey && !tags.says.white_is_zero) {
         return Ok(Cow::Borrowed(bytes));
@@ -106,7 +106,7 @@ fn as_black_is_zero<'a>(bytes: &'a [u8], file: &mut Decoder<Cursor<&'a [u8]>>, t
     Ok(Cow::Owned(copy))
 }
 
-/// Where the 16-bit values of PhotometricInterpretation stand in a directory of tags.
+/// Positions of the 16-bit values of PhotometricInterpretation in a directory of tags.
 fn value_of_tag(bytes: &[u8], directory: usize, big_endian: bool) -> Option<Vec<usize>> {
     let number = |at: usize, length: usize| -> Option<u64> {
         let b = bytes.get(at..at.checked_add(length)?)?;
@@ -128,7 +128,7 @@ fn value_of_tag(bytes: &[u8], directory: usize, big_endian: bool) -> Option<Vec<
     (!places.is_empty()).then_some(places)
 }
 
-/// The samples of a decoded page; those of fewer than 8 bits come packed, each row in whole bytes.
+/// The samples of a decoded page; samples of fewer than 8 bits are packed, each row in whole bytes.
 fn values(result: DecodingResult, bits: u8, in_row: usize) -> Values {
     fn wide<T: Copy>(v: Vec<T>, number: impl Fn(T) -> f64) -> Values {
         Values::F64(v.into_iter().map(number).collect())
@@ -149,10 +149,10 @@ fn values(result: DecodingResult, bits: u8, in_row: usize) -> Values {
     }
 }
 
-/// Numbers of a palette's colours, with the colours put in their place; a palette of greys makes a grey picture.
+/// Replaces a palette's numbers by the colours; a palette of greys gives a grey picture.
 fn coloured(mut samples: Samples, palette: &[u16]) -> Samples {
     let colours = palette.len() / 3;
-    // 16 bits by the standard; some writers put 8.
+    // 16 bits by the standard; some writers use 8.
     let shift = if palette.iter().any(|v| *v > 255) { 8 } else { 0 };
     let colour = |n: usize| [0, 1, 2].map(|c| (palette[c * colours + n] >> shift) as u8);
     let numbers: Vec<usize> = (0..samples.pixel_count()).map(|i| samples.get(i, 0) as usize).collect();

@@ -6,15 +6,15 @@ use std::io::Cursor;
 use tiff::decoder::Decoder;
 use tiff::tags::Tag;
 
-/// More pages are no set of pictures but a film.
+/// A file with more pages is a film, not a set of pictures.
 const MOST_PAGES: usize = 1 << 16;
 
-/// Numbers of pages, from 0 on, by what they are (NewSubfileType, tag 254, and SubfileType, tag 255).
+/// Page numbers, from 0 on, by type (NewSubfileType, tag 254, and SubfileType, tag 255).
 #[derive(Debug, Default)]
 pub(super) struct Pages {
     full: Vec<usize>,
     reduced: Vec<usize>,
-    /// Tell which pixels of the others are there.
+    /// Masks, which state which pixels of other pages are valid.
     pub masks: Vec<usize>,
 }
 
@@ -22,7 +22,7 @@ pub(super) fn pages(decoder: &mut Decoder<Cursor<&[u8]>>) -> Result<Pages> {
     let mut pages = Pages::default();
     let mut next = decoder.ifd_pointer();
     let mut seen = BTreeSet::new();
-    // A directory behind the first that cannot be read is what sloppy writers leave as the end of the list.
+    // A directory after the first that cannot be read ends the list: careless writers leave such an end.
     while let Some(directory) = next.and_then(|at| decoder.read_directory(at).ok()) {
         let number = seen.len();
         if number == MOST_PAGES || !seen.insert(next.map(|at| at.0)) {
@@ -44,7 +44,7 @@ pub(super) fn pages(decoder: &mut Decoder<Cursor<&[u8]>>) -> Result<Pages> {
 }
 
 impl Pages {
-    /// The page to read: the only one of full size, or the one of them that is asked for, counted from 1.
+    /// The page to read: the only one of full size, or the requested one of them, counted from 1.
     pub fn chosen(&self, page: Option<usize>) -> Result<usize> {
         let several = |what: String| {
             Err(Fault::input(what)
@@ -63,7 +63,7 @@ impl Pages {
         }
     }
 
-    /// What was passed over, in words.
+    /// A note on reduced copies that were skipped.
     pub fn note(&self, chosen: usize) -> Option<String> {
         let reduced = self.reduced.iter().filter(|k| **k != chosen).count();
         (reduced > 0).then(|| format!("{reduced} reduced copies in the file were skipped (NewSubfileType, tag 254)"))

@@ -1,4 +1,4 @@
-//! Reads what a page of a TIFF says about its samples, and refuses by name what no reader here follows.
+//! Reads what a page of a TIFF states about its samples, and refuses by name what no reader here supports.
 
 use super::kind::Kind;
 use super::says::Says;
@@ -7,12 +7,12 @@ use std::io::Cursor;
 use tiff::decoder::Decoder;
 use tiff::tags::Tag;
 
-/// Largest text of a tag that is looked at, bytes.
+/// Largest text of a tag that is read, bytes.
 const MOST_TEXT: usize = 64 << 10;
 /// Scale, offset and more of a band, as XML.
 const GDAL_METADATA: Tag = Tag::Unknown(42_112);
 
-/// How the numbers of a page stand for shades or colours (tag 262).
+/// How the numbers of a page represent shades or colours (tag 262).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Shades {
     Grey,
@@ -27,11 +27,11 @@ pub(super) struct Tags {
     pub kind: Kind,
     /// Bits of a sample.
     pub bits: u8,
-    /// Samples of a pixel, alpha among them.
+    /// Samples of a pixel, alpha included.
     pub samples: usize,
     pub alpha: bool,
     pub orientation: u16,
-    /// Red, then green, then blue of each number of a palette, 16 bits.
+    /// All reds of a palette, then all greens, then all blues, 16 bits.
     pub palette: Vec<u16>,
     pub says: Says,
 }
@@ -55,7 +55,7 @@ fn numbers(file: &mut File, tag: Tag) -> Vec<u16> {
     file.find_tag_unsigned_vec(tag).ok().flatten().unwrap_or_default()
 }
 
-/// Text up to its end mark; writers forget the mark, which the `tiff` crate insists on.
+/// Text up to its end mark. Some writers omit the mark, which the `tiff` crate requires.
 fn text(file: &mut File, tag: Tag) -> Option<String> {
     let mut buffer = vec![0; MOST_TEXT];
     let length = file.image_ifd().find_tag_bytes(tag, &mut buffer, 0).ok()??;
@@ -64,7 +64,7 @@ fn text(file: &mut File, tag: Tag) -> Option<String> {
     Some(String::from_utf8_lossy(&buffer[..end]).trim().to_owned()).filter(|t| !t.is_empty())
 }
 
-/// What the current page says.
+/// The tags of the current page.
 pub(super) fn tags(file: &mut File) -> Result<Tags> {
     let samples = number(file, Tag::SamplesPerPixel, 1)?;
     let photometric = number(file, Tag::PhotometricInterpretation, 1)?;
@@ -87,7 +87,7 @@ pub(super) fn tags(file: &mut File) -> Result<Tags> {
     let alpha = match (samples.checked_sub(colours), &extra[..]) {
         (Some(0), _) => false,
         (Some(1), [1 | 2]) => true,
-        // Many programs write alpha behind red, green and blue without saying so.
+        // Many programs write alpha after red, green and blue without stating it.
         (Some(1), []) if shades == Shades::Rgb => true,
         _ => {
             return Err(refused(format!(
@@ -114,7 +114,7 @@ pub(super) fn tags(file: &mut File) -> Result<Tags> {
     if order != 1 {
         return Err(refused(format!("has the bits of its bytes in order {order} (FillOrder, tag 266); allowed: 1")));
     }
-    // 0 is what writers put that do not know.
+    // Writers that do not know the orientation write 0.
     let orientation = number(file, Tag::Orientation, 1)?.max(1);
     if orientation > 8 {
         return Err(refused(format!("has orientation {orientation} (tag 274); allowed: 1 to 8")));
@@ -160,7 +160,7 @@ fn says(file: &mut File, photometric: u16) -> Result<Says> {
     Ok(says)
 }
 
-/// Factor and offset of a line, out of numbers as text.
+/// Factor and offset of a linear scale, from numbers as text.
 fn line(factor: Option<&str>, offset: Option<&str>) -> Result<Option<[f64; 2]>> {
     if factor.is_none() && offset.is_none() {
         return Ok(None);
@@ -175,7 +175,7 @@ fn line(factor: Option<&str>, offset: Option<&str>) -> Result<Option<[f64; 2]>> 
     }
 }
 
-/// `<Item name="SCALE" sample="0" role="scale">0.01</Item>`, and the same of the offset.
+/// `<Item name="SCALE" sample="0" role="scale">0.01</Item>`, and the same for the offset.
 fn scale_of_gdal(xml: &str) -> Result<Option<[f64; 2]>> {
     let item = |role: &str| {
         let start = xml.find(&format!("role=\"{role}\""))?;
@@ -184,7 +184,7 @@ fn scale_of_gdal(xml: &str) -> Result<Option<[f64; 2]>> {
     line(item("scale"), item("offset"))
 }
 
-/// ImageJ writes whole numbers with a sign as such without one, and says what to take off: `cf=0`, `c0=-32768`, `c1=1`.
+/// ImageJ stores signed whole numbers as unsigned ones and states how to undo it: `cf=0`, `c0=-32768`, `c1=1`.
 fn scale_of_imagej(description: &str) -> Result<Option<[f64; 2]>> {
     if !description.starts_with("ImageJ") {
         return Ok(None);

@@ -1,6 +1,6 @@
-//! Turns samples upright as a file's orientation says: number 1 to 8 of TIFF's tag 274, which Exif uses too.
+//! Turns samples upright as a file's orientation states: number 1 to 8 of TIFF's tag 274, which Exif uses too.
 
-/// Orientations that change width and height.
+/// Orientations that exchange width and height.
 fn across(orientation: u16) -> bool {
     (5..=8).contains(&orientation)
 }
@@ -33,7 +33,7 @@ pub(super) fn places(orientation: u16, stored: [u32; 2]) -> impl Iterator<Item =
 mod tests {
     use super::*;
 
-    /// TIFF 6.0, page 36: where the stored row 0 and column 0 lie in the picture as it is to be seen.
+    /// TIFF 6.0, page 36: where the stored row 0 and column 0 lie in the upright picture.
     #[test]
     fn row_and_column_zero_lie_where_the_standard_says() {
         let stored = [3, 2];
