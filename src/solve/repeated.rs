@@ -7,7 +7,7 @@ use rayon::slice::ParallelSliceMut;
 const LEAST: usize = 8;
 /// A file uses at most this many numbers for missing measurements.
 const AT_MOST: usize = 3;
-/// How many times as often as the next most frequent number a number must occur to be suspect.
+/// How many times as often as the most frequent number after the first `AT_MOST` a number must occur to be suspect.
 const OFTEN: usize = 8;
 /// Least share of all numbers, for a suspect number that lies among the others.
 const SHARE: f64 = 0.002;

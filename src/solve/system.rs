@@ -17,7 +17,7 @@ pub struct Residuals {
     /// Per group: number of residuals, unscaled length, weight.
     pub(super) groups: Vec<Group>,
     pub(super) psi: Psi,
-    /// Sums of the groups that came last and touch the same columns: whole rows without a look at where they belong.
+    /// Sums of the last groups, which touch the same columns; they are added to the matrix together, in `settle`.
     columns: Vec<usize>,
     block: Vec<f64>,
     block_gradient: Vec<f64>,
