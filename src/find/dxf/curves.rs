@@ -92,9 +92,12 @@ impl Placed {
         Placed { x: turn(inner.x), y: turn(inner.y), origin: self.point(inner.origin), z, rise }
     }
 
-    /// The larger of the scales along the two axes.
+    /// The largest stretch of any direction: the larger singular value of the two axes. Nested blocks of unequal scales
+    /// shear, and then it is beyond the length of either axis.
     fn growth(&self) -> f64 {
-        (self.x[0].hypot(self.x[1])).max(self.y[0].hypot(self.y[1]))
+        let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
+        let (p, q, r) = (dot(self.x, self.x), dot(self.y, self.y), dot(self.x, self.y));
+        (0.5 * (p + q + (p - q).hypot(2.0 * r))).sqrt()
     }
 
     /// The scale if circles stay circles; `None` otherwise.
@@ -319,4 +322,25 @@ impl Reader<'_> {
 
 fn path(placed: &Placed, mirror: f64, points: &[[f64; 2]], closed: bool) -> Form {
     Form::Path { points: points.iter().map(|p| placed.point([mirror * p[0], p[1]])).collect(), closed }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Placed;
+
+    #[test]
+    fn a_nested_block_grows_by_its_largest_stretch() {
+        // Three times as long, then turned by 45 degrees, then three times as long again.
+        let long = Placed { x: [3.0, 0.0], ..Placed::HERE };
+        let h = 0.5_f64.sqrt();
+        let turned = Placed { x: [h, h], y: [-h, h], ..Placed::HERE };
+        let all = long.after(&turned).after(&long);
+        let length = |v: [f64; 2]| v[0].hypot(v[1]);
+        let by_hand = (0..3600).map(|i| f64::from(i) * 1e-3).map(|a| {
+            let [c, s] = [a.cos(), a.sin()];
+            length([all.x[0] * c + all.y[0] * s, all.x[1] * c + all.y[1] * s])
+        });
+        let most = by_hand.fold(0.0, f64::max);
+        assert!((all.growth() - most).abs() < 1e-5 && most > 1.05 * length(all.x).max(length(all.y)), "{most}");
+    }
 }

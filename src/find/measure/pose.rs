@@ -82,7 +82,7 @@ pub fn measure(
     for o in &mut plane.observations {
         o.residual -= o.nx * plane.step.x + o.ny * plane.step.y + (o.x * o.ny - o.y * o.nx) * plane.step.z;
     }
-    let shape = measure_shape(&plane.observations, |start| part.light(&local, Some(start)));
+    let shape = measure_shape(&plane.observations, options.unit(), |start| part.light(&local, Some(start)));
     let in_plane = lit.as_ref().map_or(plane.covariance, |l| l.covariance);
     Ok(Measured {
         base_from_part: part.pose,

@@ -8,8 +8,10 @@ use super::surface_ends::Observation;
 use nalgebra::{SVector, Vector3};
 
 /// Measures the sizes: from the ends of surfaces to some tenths of a percent, then refined by light.
+/// `unit` is the recipe's, by which lengths in mm are scaled; sizes and shear have none.
 pub(in crate::find) fn measure_shape(
     ends: &[Observation],
+    unit: f64,
     by_light: impl Fn(Vector3<f64>) -> Option<Lit>,
 ) -> Option<Shape> {
     // Unknowns: place, turn, growth along the stripe and from shot to shot, sizes.
@@ -23,7 +25,8 @@ pub(in crate::find) fn measure_shape(
     if rows.is_empty() {
         return None;
     }
-    let priors = [(3, 0.05), (4, 0.05), (5, 0.03), (6, 0.03), (7, 0.03)];
-    let start = robust(&rows, &priors, 0.03).map_or(Vector3::zeros(), |f| f.step.fixed_rows::<3>(5).into());
+    let growth = 0.05 * unit;
+    let priors = [(3, growth), (4, growth), (5, 0.03), (6, 0.03), (7, 0.03)];
+    let start = robust(&rows, &priors, 0.03 * unit).map_or(Vector3::zeros(), |f| f.step.fixed_rows::<3>(5).into());
     by_light(start).map(|lit| lit.shape)
 }
