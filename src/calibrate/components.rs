@@ -6,20 +6,20 @@ use nalgebra::{DMatrix, DVector};
 
 /// The model e ~ N(J x, V₀ + Σ θₐ Uₐ).
 pub struct Components {
-    /// e, n numbers.
+    /// The residuals e, n numbers.
     pub residual: DVector<f64>,
-    /// J, n rows, a column a parameter of the fit.
+    /// J, n rows and one column per parameter of the fit.
     pub jacobian: DMatrix<f64>,
-    /// V₀, e.g. the part that comes from pixels.
+    /// V₀, for example the part that comes from the pixels.
     pub known: DMatrix<f64>,
-    /// Uₐ for θₐ = 1.
+    /// Uₐ, the covariance for θₐ = 1.
     pub parts: Vec<DMatrix<f64>>,
 }
 
 impl Components {
-    /// One step of Fisher scoring for the restricted likelihood \[patterson71\] from `theta`:
-    /// tr(P Uₐ P U_b) θ = eᵀ P Uₐ P e − tr(P Uₐ P V₀), P the projector that removes the fit.
-    /// Components never leave `floor`. `None` where a matrix is singular.
+    /// One step of Fisher scoring for the restricted likelihood \[patterson71\] from `theta`: tr(P Uₐ P U_b) θ = eᵀ
+    /// P Uₐ P e − tr(P Uₐ P V₀). P is the projector that removes the fit. No component falls below its `floor`.
+    /// `None` where a matrix is singular.
     pub fn step(&self, theta: &[f64], floor: &[f64]) -> Option<Vec<f64>> {
         let mut v = self.known.clone();
         for (t, u) in theta.iter().zip(&self.parts) {
@@ -40,7 +40,7 @@ impl Components {
             return None;
         }
         let (mut l, mut next) = self.likeliest(&s, &q, floor);
-        // Scoring can overshoot: half of the way, until it is no step back.
+        // Scoring can overshoot: the step is halved until the likelihood no longer falls.
         let before = self.likelihood(theta).unwrap_or(f64::NEG_INFINITY);
         for _ in 0..HALVINGS {
             if l >= before - SAME {
@@ -52,8 +52,9 @@ impl Components {
         Some(theta.to_vec())
     }
 
-    /// Solution of s θ = q with no component below its floor, and its likelihood's logarithm: where a component would
-    /// be, the signs do not tell which of them are nothing, and the likeliest of all ways is taken.
+    /// Solution of s θ = q with no component below its floor, and the logarithm of its likelihood. If the
+    /// unconstrained solution violates a floor, its signs do not show which components are at theirs. All
+    /// combinations are then tried and the likeliest is returned.
     fn likeliest(&self, s: &DMatrix<f64>, q: &DVector<f64>, floor: &[f64]) -> (f64, Vec<f64>) {
         let weighed = |theta: Vec<f64>| (self.likelihood(&theta).unwrap_or(f64::NEG_INFINITY), theta);
         let all = (1u32 << floor.len()) - 1;
@@ -66,7 +67,7 @@ impl Components {
         }
     }
 
-    /// Logarithm of the restricted likelihood, but for a constant; `None` where a matrix is singular.
+    /// Logarithm of the restricted likelihood up to a constant; `None` where a matrix is singular.
     fn likelihood(&self, theta: &[f64]) -> Option<f64> {
         let mut v = self.known.clone();
         for (t, u) in theta.iter().zip(&self.parts) {
@@ -82,13 +83,13 @@ impl Components {
     }
 }
 
-/// Differences of the likelihood's logarithm that are no difference.
+/// Differences of the log-likelihood up to this count as none.
 const SAME: f64 = 1e-6;
-/// Shortest step: a thousandth of the scoring's.
+/// Number of halvings: the shortest step is a thousandth of the scoring step.
 const HALVINGS: usize = 10;
 
-/// The components that `free` names (a bit each) with the others at their floor; `None` where one of them would lie
-/// below its own.
+/// Solution with the components that `free` names (one bit each) free and the others at their floor. `None` where a
+/// free component would lie below its floor.
 fn at_floor(s: &DMatrix<f64>, q: &DVector<f64>, floor: &[f64], free: u32) -> Option<Vec<f64>> {
     let (some, held): (Vec<usize>, Vec<usize>) = (0..floor.len()).partition(|a| free >> a & 1 == 1);
     let right =

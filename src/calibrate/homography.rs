@@ -5,15 +5,15 @@
 use crate::geometry::{Mat3, Vec2, Vec3};
 use nalgebra::{DMatrix, SMatrix};
 
-/// Least-squares homography `to ~ H from` by the normalised direct linear transform [hartley04,
-/// alg. 4.2]. `None` for fewer than four points or points on a line.
+/// Least-squares homography `to ~ H from` by the normalised direct linear transform [hartley04, alg. 4.2]. `None`
+/// for fewer than four points or for points on one line.
 pub fn homography(from: &[Vec2], to: &[Vec2]) -> Option<Mat3> {
     assert_eq!(from.len(), to.len());
     if from.len() < 4 {
         return None;
     }
     let (tf, tt) = (normaliser(from)?, normaliser(to)?);
-    // AᵀA of the 2n x 9 system is enough: the coordinates are normalised.
+    // The 9 x 9 matrix AᵀA of the 2n x 9 system is accurate enough because the coordinates are normalised.
     let mut m = SMatrix::<f64, 9, 9>::zeros();
     for (f, t) in from.iter().zip(to) {
         let (f, t) = (apply_affine(&tf, f), apply_affine(&tt, t));
@@ -29,7 +29,7 @@ pub fn homography(from: &[Vec2], to: &[Vec2]) -> Option<Mat3> {
     let e = DMatrix::from_column_slice(9, 9, m.as_slice()).symmetric_eigen();
     let mut order: Vec<usize> = (0..9).collect();
     order.sort_by(|a, b| e.eigenvalues[*a].total_cmp(&e.eigenvalues[*b]));
-    // A second null direction means that the points do not fix a homography.
+    // A second null direction means that the points do not determine a homography.
     if e.eigenvalues[order[1]] < 1e-11 * e.eigenvalues[order[8]] {
         return None;
     }
@@ -40,7 +40,7 @@ pub fn homography(from: &[Vec2], to: &[Vec2]) -> Option<Mat3> {
     (scale.abs() > 1e-12 * h.norm()).then(|| h / scale)
 }
 
-/// The image of a point; not finite on the horizon.
+/// The image of a point; not finite for points on the horizon.
 pub fn apply(h: &Mat3, p: &Vec2) -> Vec2 {
     let q = h * Vec3::new(p.x, p.y, 1.0);
     Vec2::new(q.x / q.z, q.y / q.z)
@@ -50,7 +50,7 @@ fn apply_affine(t: &Mat3, p: &Vec2) -> Vec2 {
     Vec2::new(t[(0, 0)] * p.x + t[(0, 2)], t[(1, 1)] * p.y + t[(1, 2)])
 }
 
-/// Moves the centroid to the origin and the mean distance to sqrt(2).
+/// Similarity that moves the centroid to the origin and scales the mean distance to sqrt(2).
 fn normaliser(points: &[Vec2]) -> Option<Mat3> {
     let n = points.len() as f64;
     let c = points.iter().sum::<Vec2>() / n;

@@ -1,49 +1,49 @@
-//! In: points of a part that was passed to and fro, each with the way it went a second. Out: by how much the
-//! pictures' times are late against the poses', so that both passes show one part.
+//! In: points of a part that was scanned back and forth, each with its velocity in the cloud. Out: the delay of the
+//! pictures' times against the poses' times at which both passes show the same part.
 //! Frame and unit: the cloud's frame, mm; seconds.
 
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec3;
 use nalgebra::Matrix3;
 
-/// A point, and how it moves in the cloud if its shot's pose is of a second later.
+/// A point, and its displacement in the cloud per second by which the pose of its shot is later.
 #[derive(Clone, Copy, Debug)]
 pub struct Passing {
-    /// mm.
+    /// Position, mm.
     pub at: Vec3,
-    /// mm/s.
+    /// Displacement per second, mm/s.
     pub velocity: Vec3,
 }
 
-/// What was found.
+/// The delay that was found.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Delay {
-    /// The pictures' times are late by so much, s, beyond what was taken for it.
+    /// Delay of the pictures' times beyond the delay already applied, s.
     pub seconds: f64,
-    /// 1 sigma.
+    /// Standard deviation of the delay, s.
     pub sigma_s: f64,
-    /// How far the passes' heights are apart without it and with it, mm (robust rms).
+    /// Difference in height between the passes without and with the delay, mm (robust rms).
     pub apart_mm: [f64; 2],
-    /// Speeds of the passes, mm/s: forth is positive.
+    /// Speeds of the passes, mm/s; the forward direction is positive.
     pub speeds: Vec<f64>,
 }
 
-/// Strips along the motion that are compared by themselves, and parts of them that tell the error.
+/// Strips along the motion, each compared separately, and parts of them for the jackknife error.
 const STRIPS: usize = 96;
 const PARTS: usize = 12;
-/// Heights that differ by more than this say little of how much, mm: shadows, reflections.
+/// Heights that differ by more than this carry little information about the delay, mm: shadows, reflections.
 const SCALE: f64 = 0.5;
-/// ... and where the passes nearly agree, no less than this.
+/// Lower limit of this scale where the passes nearly agree, mm.
 const FINEST: f64 = 0.02;
 const ROUNDS: usize = 8;
-/// The lowest cost against the usual one.
+/// The lowest cost must be below this share of the median cost.
 const DISTINCT: f64 = 0.8;
-/// A delay is looked for up to this, s.
+/// Largest delay that is searched for, s.
 const FARTHEST: f64 = 0.15;
-/// A shot slower than this share of the fastest is at a turning point.
+/// A shot slower than this share of the fastest is at a turning point and is skipped.
 const CRUISE: f64 = 0.5;
 
-/// Along, across, height of a point, and its speed along.
+/// A point in motion coordinates: position along the motion and height, mm; speed along the motion, mm/s.
 #[derive(Clone, Copy)]
 struct Place {
     u: f64,
@@ -51,17 +51,17 @@ struct Place {
     speed: f64,
 }
 
-/// One pass: of each strip its places in order.
+/// One pass: the places of each strip, in order along the motion.
 struct Pass {
     forth: bool,
     strips: Vec<Vec<Place>>,
     speed: f64,
 }
 
-/// Finds the delay. `shots`: in order, the points of each.
+/// Finds the delay. `shots`: the points of each shot, in order of time.
 ///
 /// # Errors
-/// No motion, or one in one direction only; too few points; a part without slopes or edges across the motion.
+/// No motion, or motion in one direction only; too few points; a part without slopes or edges across the motion.
 pub fn delay(shots: &[Vec<Passing>], up: &Vec3) -> Result<Delay> {
     let (along, fastest) = main_way(shots)?;
     let across = up.cross(&along).normalize();
@@ -75,21 +75,21 @@ pub fn delay(shots: &[Vec<Passing>], up: &Vec3) -> Result<Delay> {
             .next("record the same part back and forth"));
     }
     let spacing = spacing(&passes);
-    // A step that shifts both passes by a quarter of the way between two shots.
+    // A step that shifts both passes by a quarter of the distance between two shots.
     let step = 0.25 * spacing / (2.0 * fastest);
     let steps = (FARTHEST / step).ceil() as i64;
     let coarse = costs(&pairs, spacing, SCALE, (-steps..=steps).map(|k| k as f64 * step));
     let total = |c: &Cost| c.all().unwrap_or(f64::INFINITY);
     let best = (0..coarse.len()).min_by(|&a, &b| total(&coarse[a].1).total_cmp(&total(&coarse[b].1))).expect("some");
     let mut seconds = coarse[best].0;
-    // What looks the same wherever it is has no lowest place, only noise.
+    // A part that looks the same everywhere has no distinct minimum, only noise.
     let mut all: Vec<f64> = coarse.iter().map(|(_, c)| total(c)).filter(|c| c.is_finite()).collect();
     all.sort_by(f64::total_cmp);
     if all.is_empty() || total(&coarse[best].1) > DISTINCT * all[all.len() / 2] {
         return Err(flat());
     }
-    // Where the passes nearly agree their scatter is known: what differs by much more, edges and shadows, says
-    // nothing of a part of a step.
+    // Where the passes nearly agree, their scatter is known. Much larger differences (edges, shadows) carry no
+    // information about a fraction of a step.
     let scale = (3.0 * scatter(&pairs, spacing, seconds)).clamp(FINEST, SCALE);
     let mut fine = Vec::new();
     for _ in 0..ROUNDS {
@@ -107,7 +107,7 @@ pub fn delay(shots: &[Vec<Passing>], up: &Vec3) -> Result<Delay> {
         return Err(flat());
     }
     let mean = parts.iter().sum::<f64>() / n;
-    // Jackknife: each with one part left out.
+    // Jackknife: each estimate excludes one part.
     let sigma_s = ((n - 1.0) / n * parts.iter().map(|d| (d - mean).powi(2)).sum::<f64>()).sqrt();
     let at = |s: f64| costs(&pairs, spacing, SCALE, std::iter::once(s))[0].1.all().unwrap_or(f64::NAN).sqrt();
     let apart_mm = [at(0.0), at(seconds)];
@@ -173,7 +173,7 @@ fn split(shots: &[Vec<Passing>], along: &Vec3, across: &Vec3, height: &Vec3, fas
     passes
 }
 
-/// Usual way between two shots, mm.
+/// Median distance between two shots along the motion, mm.
 fn spacing(passes: &[Pass]) -> f64 {
     let steps = passes.iter().flat_map(|p| &p.strips).flat_map(|s| s.windows(2).map(|w| w[1].u - w[0].u));
     let mut steps: Vec<f64> = steps.collect();
@@ -181,11 +181,11 @@ fn spacing(passes: &[Pass]) -> f64 {
     steps.get(steps.len() / 2).copied().unwrap_or(1.0).max(1e-6)
 }
 
-/// Squared difference of heights, and how many, by part.
+/// Per part: cost of the height differences and their number.
 struct Cost(Vec<[f64; 2]>);
 
 impl Cost {
-    /// Mean of all; none where too little overlaps.
+    /// Mean over all parts; `None` where too little overlaps.
     fn all(&self) -> Option<f64> {
         self.without(usize::MAX)
     }
@@ -213,7 +213,7 @@ fn costs(pairs: &[(&Pass, &Pass)], spacing: f64, scale: f64, delays: impl Iterat
     delays.map(at).collect()
 }
 
-/// What heights of two passes usually differ by, 1 sigma.
+/// Usual difference between the heights of two passes, 1 sigma, mm.
 fn scatter(pairs: &[(&Pass, &Pass)], spacing: f64, delay: f64) -> f64 {
     let mut all = Vec::new();
     for (a, b) in pairs {
@@ -223,13 +223,13 @@ fn scatter(pairs: &[(&Pass, &Pass)], spacing: f64, delay: f64) -> f64 {
     all.get(all.len() / 2).map_or(SCALE, |m| 1.4826 * m)
 }
 
-/// Differences of height of two passes over one strip, on places four times as dense as the shots.
+/// Height differences of two passes over one strip, at positions four times as dense as the shots.
 fn compare(a: &[Place], b: &[Place], delay: f64, spacing: f64, mut take: impl FnMut(f64)) {
     let (mut a, mut b) = (Walk::new(a, delay, spacing), Walk::new(b, delay, spacing));
     let (Some(first), Some(last)) = (a.first().zip(b.first()), a.last().zip(b.last())) else { return };
     let (from, to) = (first.0.max(first.1), last.0.min(last.1));
     let step = 0.25 * spacing;
-    // Places of the part, not of the passes: a grid of its own.
+    // The grid is fixed to the part, not to the passes.
     let mut k = (from / step).ceil();
     while k * step <= to {
         if let (Some(ha), Some(hb)) = (a.height(k * step), b.height(k * step)) {
@@ -239,7 +239,7 @@ fn compare(a: &[Place], b: &[Place], delay: f64, spacing: f64, mut take: impl Fn
     }
 }
 
-/// Goes along a strip whose places are shifted by a delay.
+/// Interpolates heights along a strip whose places are shifted by a delay.
 struct Walk<'a> {
     places: &'a [Place],
     delay: f64,
@@ -260,7 +260,7 @@ impl<'a> Walk<'a> {
     fn last(&self) -> Option<f64> {
         self.places.last().map(|p| self.u(p))
     }
-    /// Height at a place not before the last one asked for; none in a gap.
+    /// Height at a position that is not before the previous query; `None` in a gap.
     fn height(&mut self, u: f64) -> Option<f64> {
         while self.at + 2 < self.places.len() && self.u(&self.places[self.at + 1]) < u {
             self.at += 1;
@@ -272,7 +272,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// Bottom of the parabola through the costs, with a part left out.
+/// Minimum of the parabola through the costs, without one part if stated.
 fn lowest(costs: &[(f64, Cost)], without: Option<usize>) -> Option<f64> {
     let points: Option<Vec<(f64, f64)>> =
         costs.iter().map(|(d, c)| Some((*d, c.without(without.unwrap_or(usize::MAX))?))).collect();
@@ -295,7 +295,8 @@ fn lowest(costs: &[(f64, Cost)], without: Option<usize>) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// A wave passed to and fro at 20 mm/s, seen `late` seconds late, 0.3 mm between shots, heights with 0.02 mm noise.
+    /// A wave scanned back and forth at 20 mm/s with pictures `late` seconds late: 0.3 mm between shots, 0.02 mm
+    /// height noise.
     fn passed(late: f64, wave: f64) -> Vec<Vec<Passing>> {
         let mut state = 7u64;
         let mut noise = move || {
@@ -310,7 +311,7 @@ mod tests {
                 let velocity = Vec3::new(speed, 0.0, 0.0);
                 let point = |j: u32| {
                     let w = 0.25 * f64::from(j);
-                    // The world as it was when the picture was taken, at the pose of `late` afterwards.
+                    // The true surface when the picture was taken, at the pose of `late` seconds afterwards.
                     Passing { at: Vec3::new(x + speed * late, w, surface(x, w) + noise()), velocity }
                 };
                 shots.push((0..120).map(point).collect());

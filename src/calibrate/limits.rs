@@ -1,25 +1,25 @@
-//! In: an expected error, what the work tolerates and at which depths. Out: the verdict with its reasons.
+//! In: an expected error, the application's tolerance and its depths. Out: the verdict with its reasons.
 //! Frame and unit: along the camera's optical axis (of a profile sensor: its z), mm.
 
 use crate::fault::{Fault, Result};
 use crate::rig::{Verdict, Volume};
 use crate::solve::End;
 
-/// Share of what the sensor sees that counts as the tolerance where nobody states one: the paper's 0.25 mm for
-/// insertion where its camera sees 167 mm. Parts are as large as the view that they are measured in.
+/// Share of the sensor's field of view that counts as the tolerance if none is stated: 0.25 mm for insertion at a
+/// view of 167 mm, as in the paper. Parts are assumed to be as large as the view that they are measured in.
 const TOLERATED_SHARE: f64 = 1.5e-3;
 
-/// What was stated beforehand; the rest follows from the data ([`Asked::limits`]).
+/// What the user stated beforehand; the rest follows from the data ([`Asked::limits`]).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Asked {
     /// Depths at which the result is judged.
     pub working: Option<Volume>,
-    /// What the work tolerates, mm; above 0.
+    /// Tolerance of the application, mm; above 0.
     pub tolerance_mm: Option<f64>,
 }
 
 impl Asked {
-    /// Refuses near beyond far and a tolerance that is not above 0.
+    /// Refuses a near depth beyond the far depth, and a tolerance that is not above 0.
     pub fn check(&self) -> Result<()> {
         let w = self.working.as_ref().map_or([0.0, 0.0], |w| [w.near_mm, w.far_mm]);
         let tolerance = self.tolerance_mm.unwrap_or(1.0);
@@ -32,7 +32,7 @@ impl Asked {
         }
         Ok(())
     }
-    /// `seen` is where the data lay, `view_mm` how wide the sensor sees at a depth.
+    /// `seen`: depths of the data. `view_mm`: width of the sensor's field of view at a depth, mm.
     pub fn limits(&self, seen: &Volume, view_mm: impl Fn(f64) -> f64) -> Limits {
         let working = self.working.clone().unwrap_or_else(|| seen.clone());
         let view = view_mm(working.middle());
@@ -47,10 +47,10 @@ impl Asked {
     }
 }
 
-/// What a calibration must promise to be called good or usable, and where.
+/// Largest expected error for the verdicts good and usable, and the depths at which it is judged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
-    /// Good where the expected error (1 sigma) is at most half of it, usable up to twice.
+    /// Good if the expected error (1 sigma) is at most half of this, usable if it is at most twice this, mm.
     pub tolerance_mm: f64,
     /// Where the tolerance comes from, in words.
     pub tolerance_from: String,
@@ -63,11 +63,11 @@ impl Limits {
     pub fn middle(&self) -> f64 {
         self.working.middle()
     }
-    /// Largest expected error (1 sigma) that is usable: twice the tolerance, mm.
+    /// Largest expected error (1 sigma) for the verdict usable: twice the tolerance, mm.
     pub fn usable_mm(&self) -> f64 {
         2.0 * self.tolerance_mm
     }
-    /// The judgement that the expected error alone allows. `says` tells what is expected and where.
+    /// The verdict by the expected error alone. `says`: the expected error and its place, in words.
     pub fn by_error(&self, expected_mm: f64, says: String) -> Judgement {
         let verdict = if expected_mm <= 0.5 * self.tolerance_mm {
             Verdict::Good
@@ -90,32 +90,32 @@ impl Limits {
     }
 }
 
-/// Collects reasons; the worst one makes the verdict.
+/// Collects reasons; the worst one determines the verdict.
 #[derive(Clone, Debug)]
 pub struct Judgement {
-    /// The worst that a reason has made it.
+    /// The worst verdict so far.
     pub verdict: Verdict,
     /// Why, in words; one sentence each.
     pub reasons: Vec<String>,
-    /// What to do about it, in words.
+    /// What to do about them, in words.
     pub advice: Vec<String>,
 }
 
 impl Judgement {
-    /// Where `when` holds, the verdict is at best this one.
+    /// If `when` holds, the verdict is at best this one.
     pub fn at_best(&mut self, verdict: Verdict, when: bool, reason: impl FnOnce() -> String) {
         if when {
             self.verdict = self.verdict.max(verdict);
             self.reasons.push(reason());
         }
     }
-    /// A fit that ended anywhere but at a minimum is usable at best.
+    /// A fit that did not end at a minimum is usable at best.
     pub fn ended(&mut self, end: End) {
         if let Some(remark) = end.remark() {
             self.at_best(Verdict::Usable, true, || remark.into());
         }
     }
-    /// Where `when` holds, adds this advice.
+    /// If `when` holds, adds this advice.
     pub fn advise(&mut self, when: bool, advice: impl FnOnce() -> String) {
         if when {
             self.advice.push(advice());
@@ -123,7 +123,7 @@ impl Judgement {
     }
 }
 
-/// rms of some numbers; 0 for none, infinite ones left out.
+/// rms of the finite values; 0 if there are none.
 pub fn rms(values: impl Iterator<Item = f64>) -> f64 {
     let (s, n) = values.filter(|v| v.is_finite()).fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
     f64::sqrt(s / f64::max(n, 1.0))

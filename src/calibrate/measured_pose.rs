@@ -1,5 +1,5 @@
-//! In: the features of one picture of a board and the camera that took it. Out: the board's pose as
-//! a measurement: its information and how it moves with the camera's parameters.
+//! In: the features of one picture of a board and the camera that took it. Out: the board's pose as a measurement,
+//! with its information matrix and its derivatives by the camera's parameters.
 //! Frame and unit: camera_from_board, mm; features in px (docs/math.md, Board pose (1) to (5)).
 
 use super::boards::BoardView;
@@ -12,37 +12,37 @@ use crate::recording::BoardSpec;
 use crate::solve::{LmOptions, Loss, Problem, Residuals, lm};
 use nalgebra::{Matrix6, SMatrix};
 
-/// Change of six pose numbers by the camera's parameters, in the order of [`crate::camera::NAMES`].
+/// Derivatives of the six pose parameters by the camera's parameters, in the order of [`crate::camera::NAMES`].
 pub type ByIntrinsics = SMatrix<f64, 6, PARAMETERS>;
 
-/// What a picture's pixels say about the camera, its own pose left to them: a change d of the camera's parameters
-/// changes the sum of squared residuals, in units of the features' stated sigmas, by 2 gᵀd + dᵀAd.
+/// What the pixels of one picture state about the camera, its own pose eliminated. A change d of the camera's
+/// parameters changes the sum of squared residuals, in units of the features' stated sigmas, by 2 gᵀd + dᵀAd.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AboutCamera {
-    /// A.
+    /// The matrix A.
     pub information: ParameterMatrix,
-    /// g.
+    /// The vector g.
     pub gradient: Parameters,
 }
 
 impl AboutCamera {
-    /// Says nothing.
+    /// No information about the camera.
     pub fn silent() -> AboutCamera {
         AboutCamera { information: ParameterMatrix::zeros(), gradient: Parameters::zeros() }
     }
 }
 
-/// The features of a picture may fit their board this many times worse than those of the others.
+/// A picture whose features fit the board more than this many times worse than usual is judged by its own factor.
 pub const MISFIT: f64 = 3.0;
 
-/// The features of one picture: the same index is the same feature.
+/// The features of one picture. Entries with the same index belong to the same feature.
 #[derive(Clone, Debug)]
 pub struct SeenBoard {
-    /// The picture, as messages name it.
+    /// Name of the picture, as in messages.
     pub name: String,
-    /// Board frame, mm.
+    /// Positions on the board, board frame, mm.
     pub points: Vec<Vec3>,
-    /// px.
+    /// Positions in the picture, px.
     pub pixels: Vec<Vec2>,
     /// Standard deviation of each pixel coordinate up to one common factor, px.
     pub sigmas_px: Vec<f64>,
@@ -61,14 +61,14 @@ impl SeenBoard {
     }
 }
 
-/// The pose of a board in one picture, with everything later solvers need from its pixels.
+/// The pose of a board in one picture, with everything that later solvers need from its pixels.
 #[derive(Clone, Debug)]
 pub struct MeasuredPose {
-    /// Of the picture.
+    /// Name of the picture.
     pub name: String,
     /// The pose that fits the features best, mm.
     pub camera_from_board: Rigid<Camera, Board>,
-    /// A step s from the optimum raises the sum of squared residuals, in units of the features'
+    /// Information matrix: a step s from the optimum raises the sum of squared residuals, in units of the features'
     /// stated sigmas, by sᵀ·information·s.
     pub information: Matrix6<f64>,
     /// Step of the pose per unit of each camera parameter.
@@ -77,27 +77,29 @@ pub struct MeasuredPose {
     pub about_camera: AboutCamera,
     /// rms of the feature residuals per coordinate, px; NaN for a pose that was given without pixels.
     pub rms_px: f64,
-    /// What the residuals say about the stated sigmas: the factor that makes them true.
+    /// Factor by which the stated sigmas have to be multiplied, estimated from the residuals.
     pub sigma_factor: f64,
-    /// Coordinates minus the six of the pose.
+    /// Degrees of freedom: number of pixel coordinates minus the six of the pose.
     pub freedom: f64,
-    /// Corners of the features' bounding box on the board, and its centre: board frame, mm.
+    /// Corners of the features' bounding box on the board and, last, its centre; board frame, mm.
     pub landmarks: [Vec3; 5],
 }
 
 impl MeasuredPose {
-    /// A pose that another program measured, with its sigmas per axis at the board's origin (mm, rad) where they are
-    /// stated; else what is left open is a turn about that origin, in rad, and `freedom` is 0. It says nothing of the
-    /// camera. `side`: of the square about the origin at whose corners poses are compared, mm.
+    /// A pose that another program measured. `sigma`: its sigmas per axis at the board's origin (mm, rad), if
+    /// stated. Without them the information is in units of a rotation of 1 rad about that origin, and `freedom` is
+    /// 0. The pose carries no information about the camera. `side`: side of the square about the origin at whose
+    /// corners poses are compared, mm.
     pub fn given(
         name: String,
         camera_from_board: Rigid<Camera, Board>,
         sigma: Option<[f64; 2]>,
         side: f64,
     ) -> MeasuredPose {
-        // The place's scatter cannot be told from the robot's: 1 mm per rad of the turn's keeps the sums finite.
+        // The scatter of the position cannot be separated from the robot's. 1 mm per rad of rotation keeps the sums
+        // finite.
         let [place, turn] = sigma.unwrap_or([1.0, 1.0]);
-        // A turn about the board's origin o is the step v = o × w, w.
+        // A rotation about the board's origin o is the step v = o × w, w.
         let lever = skew(&camera_from_board.translation);
         let mut covariance = Matrix6::<f64>::zeros();
         let own = Mat3::identity() * (place * place) + lever * lever.transpose() * (turn * turn);
@@ -114,19 +116,19 @@ impl MeasuredPose {
             by_intrinsics: ByIntrinsics::zeros(),
             about_camera: AboutCamera::silent(),
             rms_px: f64::NAN,
-            // Stated sigmas are taken as they are: no residuals could correct them.
+            // Stated sigmas are used unchanged: no residuals could correct them.
             sigma_factor: 1.0,
             freedom: if sigma.is_some() { 1.0 } else { 0.0 },
             landmarks: [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0), Vec3::zeros()],
         }
     }
-    /// The distance (mm, rms over the landmarks) between this pose and another of the same board.
+    /// Distance between this pose and another pose of the same board, rms over the landmarks, mm.
     pub fn displacement(&self, other: &Rigid<Camera, Board>) -> f64 {
         let sum: f64 =
             self.landmarks.iter().map(|p| (self.camera_from_board.point(p) - other.point(p)).norm_squared()).sum();
         (sum / self.landmarks.len() as f64).sqrt()
     }
-    /// The distance in px between this pose and another of the same board, rms over the landmarks.
+    /// Distance between this pose and another pose of the same board, rms over the landmarks, px.
     pub fn displacement_px(&self, other: &Rigid<Camera, Board>, camera: &Intrinsics) -> f64 {
         let at = |t: &Rigid<Camera, Board>, p| camera.pixel_from_point(&t.point(p));
         let d: Vec<f64> = self
@@ -140,12 +142,12 @@ impl MeasuredPose {
     pub fn centre(&self) -> Vec3 {
         self.camera_from_board.point(&self.landmarks[4])
     }
-    /// Its own factor where it fits far worse than usual, of a blurred picture or of another camera, else the usual
-    /// one.
+    /// The picture's own factor if it exceeds [`MISFIT`] times the usual one (a blurred picture, or one of another
+    /// camera); otherwise the usual factor.
     pub fn factor_among(&self, usual: f64) -> f64 {
         if self.sigma_factor > MISFIT * usual { self.sigma_factor } else { usual }
     }
-    /// Covariance of a step, the features' sigmas being this factor times the stated ones.
+    /// Covariance of a step if the features' true sigmas are this factor times the stated ones.
     pub fn covariance(&self, sigma_factor: f64) -> Matrix6<f64> {
         let inverse = self.information.try_inverse().unwrap_or_else(|| Matrix6::from_element(f64::INFINITY));
         inverse * (sigma_factor * sigma_factor)
@@ -177,7 +179,7 @@ impl Problem for PoseProblem<'_> {
     }
 }
 
-/// Refines a board's pose by its pixels and measures how well it is known.
+/// Refines a board's pose by its pixels and computes its information matrix.
 pub fn measure(seen: &SeenBoard, camera: &Intrinsics, start: &Rigid<Camera, Board>) -> Result<MeasuredPose> {
     let same = seen.points.len() == seen.pixels.len() && seen.points.len() == seen.sigmas_px.len();
     if !same || seen.points.len() < 4 {
@@ -191,7 +193,8 @@ pub fn measure(seen: &SeenBoard, camera: &Intrinsics, start: &Rigid<Camera, Boar
         .next("take the picture again with the whole board in view"));
     }
     let problem = PoseProblem { seen, camera };
-    // With Huber's weights the last digits of the cost move on; 1e-11 of it is far below a thousandth of a sigma.
+    // With Huber weights the last digits of the cost keep changing; 1e-11 of the cost is far below a thousandth of
+    // a sigma.
     let options = LmOptions { loss: Loss::Huber(2.5), estimate_scale: true, tolerance: 1e-11, ..LmOptions::default() };
     let found = lm(&problem, *start, &options).minimum().filter(|f| f.covariance.is_some()).ok_or_else(|| {
         Fault::refused(format!("{}: the board's pose is not determined by its pixels", seen.name))
@@ -250,15 +253,14 @@ fn landmarks(points: &[Vec3]) -> [Vec3; 5] {
     ]
 }
 
-/// Finds the pose of a board from the features that a detector found, and measures it.
+/// Finds the pose of a board from the features that a detector found, and computes its information matrix.
 pub fn measure_view(name: &str, camera: &Intrinsics, board: &BoardSpec, view: &BoardView) -> Result<MeasuredPose> {
     let start = board_pose(camera, board, view).map_err(|e| e.at(name))?;
     measure(&SeenBoard::from_view(name, board, view), camera, &start.camera_from_board)
 }
 
-/// One factor for all pictures: their residuals pooled by degrees of freedom; `None` where nothing tells it. A
-/// picture that fits more than three times as badly as the middle one, blurred or of another camera, does not speak
-/// for the others.
+/// One sigma factor for all pictures: their residuals pooled by degrees of freedom. `None` if no pose has degrees
+/// of freedom. A picture whose factor exceeds three times the median (blurred, or of another camera) is excluded.
 pub fn pooled_factor<'a>(poses: impl Iterator<Item = &'a MeasuredPose>) -> Option<f64> {
     let poses: Vec<&MeasuredPose> = poses.filter(|p| p.freedom > 0.0).collect();
     let mut factors: Vec<f64> = poses.iter().map(|p| p.sigma_factor).collect();
@@ -271,10 +273,11 @@ pub fn pooled_factor<'a>(poses: impl Iterator<Item = &'a MeasuredPose>) -> Optio
     (freedom > 0.0).then(|| f64::sqrt(sum / freedom))
 }
 
-/// What a file says of the camera's errors; parameters that it does not name count as known.
+/// The covariance that a file states for the camera's parameters. Parameters that the file does not name count as
+/// exact.
 ///
 /// # Errors
-/// Numbers that are no covariance.
+/// Numbers that form no covariance matrix.
 pub fn intrinsic_covariance(covariance: &crate::rig::Covariance) -> Result<CameraCovariance> {
     CameraCovariance::new(covariance.of(NAMES))
 }

@@ -1,5 +1,6 @@
-//! In: pictures' features, robot poses, laser peaks. Out: calibrations with covariance and verdict.
-//! Frame and unit: stated in each file; mm, rad, px. Rooms by what is calibrated; beside them what they share.
+//! In: features of pictures, robot poses, laser peaks. Out: calibrations with covariance and verdict.
+//! Frame and unit: stated in each file; mm, rad, px. One module per calibrated object; shared code lies beside
+//! them.
 
 pub mod axis;
 pub mod ball;

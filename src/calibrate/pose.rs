@@ -16,12 +16,12 @@ use nalgebra::Matrix6;
 pub struct BoardPose {
     /// The pose that fits the features best, mm.
     pub camera_from_board: Rigid<Camera, Board>,
-    /// Of a [`LeftStep`], mm and rad. The corners' common sigma is estimated from the residuals
-    /// where they are larger than the corners' own sigmas.
+    /// Covariance of a [`LeftStep`], mm and rad. The features' common sigma is estimated from the residuals where
+    /// these are larger than the features' stated sigmas.
     pub covariance: Matrix6<f64>,
     /// Reprojection error, px.
     pub rms_px: f64,
-    /// Cost of the mirrored pose over the cost of this one; near 1 the tilt's sign is a guess.
+    /// Cost of the mirrored pose over the cost of this one. Near 1 the sign of the tilt is a guess.
     pub ambiguity: f64,
     /// Robust weight of each point of the view.
     pub weights: Vec<f64>,
@@ -54,11 +54,11 @@ impl Problem for OneBoard<'_> {
     }
 }
 
-/// Pose of a planar board: homography start, both minima of the planar ambiguity refined, the better
-/// one kept. Robust against some wrong points.
+/// Pose of a planar board: starts from the homography, refines both minima of the planar ambiguity and returns the
+/// better one. Robust against some wrong points.
 ///
 /// # Errors
-/// Fewer than 4 points, points on a line, or points that fit no pose in front of the camera.
+/// Fewer than 4 points, points on one line, or points that fit no pose in front of the camera.
 pub fn board_pose(intrinsics: &Intrinsics, board: &BoardSpec, view: &BoardView) -> Result<BoardPose> {
     pose_of_points(intrinsics, &board.features(), view)
 }
@@ -88,14 +88,15 @@ pub fn pose_of_points(intrinsics: &Intrinsics, features: &[Vec3], view: &BoardVi
         LmOptions { loss: Loss::Huber(2.0), estimate_scale: true, max_iterations: 50, ..LmOptions::default() };
     let mut found: Vec<Solution<Rigid<Camera, Board>>> = [start, mirrored(&start, &Vec3::new(centre.x, centre.y, 0.0))]
         .into_iter()
-        // What reports are made of is refined from this, and its end looked at there.
+        // `so_far` also accepts a fit that did not converge: reports refine this pose further and check the end
+        // there.
         .filter_map(|s| lm(&problem, s, &options).so_far())
         .filter(|s| s.state.translation.z > 0.0)
         .collect();
     found.sort_by(|a, b| a.rms.total_cmp(&b.rms));
     let best = found.first().ok_or_else(|| weak("no pose in front of the camera fits the points".into()))?;
     let covariance = best.covariance.as_ref().ok_or_else(|| weak("the points do not determine a pose".into()))?;
-    // Both starts may end in one minimum: then there is no ambiguity.
+    // Both starts may end in the same minimum; then there is no ambiguity.
     let other = found.get(1).filter(|o| o.state.difference(&best.state).0 > 1e-3);
     let scale = best.sigma0.max(1.0).powi(2);
     Ok(BoardPose {
@@ -126,8 +127,8 @@ pub fn pose_from_homography(h: &Mat3) -> Rigid<Camera, Board> {
     Rigid::new(orthonormalise(&r), h3 * scale)
 }
 
-/// The other minimum of a plane's pose: its tilt reflected in the line of sight to `centre`, a point
-/// of the board \[schweighofer06\].
+/// The other minimum of a plane's pose: its tilt is mirrored about the line of sight to `centre`, a point of the
+/// board \[schweighofer06\].
 fn mirrored(pose: &Rigid<Camera, Board>, centre: &Vec3) -> Rigid<Camera, Board> {
     let c = pose.point(centre);
     let sight = c.normalize();
@@ -186,7 +187,7 @@ mod tests {
             let e = nalgebra::Vector6::new(t.x, t.y, t.z, d.x, d.y, d.z);
             sum.push((e.transpose() * found.covariance.try_inverse().unwrap() * e)[0]);
         }
-        // Mean of 100 chi-squares with 6 degrees of freedom: 6 +- 0.35.
+        // Mean of 100 chi-squares with 6 degrees of freedom: 6 ± 0.35.
         let mean = sum.iter().sum::<f64>() / sum.len() as f64;
         assert!((4.8..7.2).contains(&mean), "{mean}");
     }

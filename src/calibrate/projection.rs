@@ -8,7 +8,7 @@ use nalgebra::{Matrix2, Matrix2x3, SMatrix};
 
 /// A pixel with its derivatives.
 pub struct Projected {
-    /// Where the point is seen, px.
+    /// Pixel at which the point is seen, px.
     pub pixel: Vec2,
     /// px per mm: rows u, v; columns x, y, z of the camera frame.
     pub by_point: Matrix2x3<f64>,
@@ -16,7 +16,7 @@ pub struct Projected {
     pub by_intrinsics: SMatrix<f64, 2, PARAMETERS>,
 }
 
-/// `None` for points behind the camera, and where the lens has no picture of them.
+/// `None` for points behind the camera and for points that the lens model cannot project.
 pub fn project(k: &Intrinsics, p: &Vec3) -> Option<Projected> {
     if p.z <= 0.0 {
         return None;

@@ -1,19 +1,19 @@
-//! In: point sets of one flat surface seen from several poses; predicted and touched points. Out: how
-//! far they disagree — errors that no residual of a fit can show.
+//! In: point sets of one flat surface scanned from several poses; predicted and touched points. Out: how far they
+//! disagree, which includes errors that the residuals of a fit cannot show.
 //! Frame and unit: base frame; mm, degrees.
 
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Plane, Vec3, fit_plane};
 use rand::SeedableRng;
 
-/// One view of the flat surface against all views together.
+/// One view of the flat surface compared with all views together.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct FlatView {
-    /// Of the view, as it was given.
+    /// Name of the view, as given.
     pub name: String,
-    /// How many of its points are in its plane's fit.
+    /// Number of its points in the fit of its plane.
     pub points: usize,
-    /// rms about the view's own plane, points beyond five robust sigmas left out, mm.
+    /// rms about the view's own plane without the points beyond five robust sigmas, mm.
     pub own_rms_mm: f64,
     /// Height of the view's plane over the common one, at the common centre, mm.
     pub height_mm: f64,
@@ -24,11 +24,11 @@ pub struct FlatView {
 /// How well the views of one flat surface agree.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct FlatCheck {
-    /// One a view, in the order given.
+    /// One entry per view, in the order given.
     pub views: Vec<FlatView>,
-    /// Standard deviation of the heights, and their range, mm.
+    /// Standard deviation of the heights, mm.
     pub height_spread_mm: f64,
-    /// From the lowest to the highest, mm.
+    /// Range of the heights, from the lowest to the highest, mm.
     pub height_range_mm: f64,
     /// Largest angle between a view's plane and the common one, degrees.
     pub largest_tilt_deg: f64,
@@ -38,9 +38,9 @@ pub struct FlatCheck {
     pub own_rms_mm: f64,
 }
 
-/// The plane of most points, by least median of distances over drawn triples \[rousseeuw84\]: a scan that reaches
-/// over the plate's edge holds the table beside it too. 200 draws hit the plate where it is 40 % of the points or
-/// more in all but one case of 400,000.
+/// The plane of the majority of points, by least median of distances over randomly drawn triples \[rousseeuw84\]. A
+/// scan that reaches over the plate's edge also holds the table beside it. If 40 % or more of the points lie on the
+/// plate, 200 draws miss it in one case of 400,000.
 fn start(points: &[Vec3]) -> Option<Plane<Base>> {
     let mut rng = rand_pcg::Pcg64::seed_from_u64(1);
     let step = points.len().div_ceil(2000).max(1);
@@ -58,7 +58,7 @@ fn start(points: &[Vec3]) -> Option<Plane<Base>> {
     best.map(|b| b.1)
 }
 
-/// Plane through points, those beyond five robust sigmas left out.
+/// Plane through points, without those beyond five robust sigmas. Returns the plane, the rms and the points used.
 fn robust_plane(points: &[Vec3]) -> Option<(Plane<Base>, f64, Vec<Vec3>)> {
     if points.len() < 3 {
         return None;
@@ -75,7 +75,7 @@ fn robust_plane(points: &[Vec3]) -> Option<(Plane<Base>, f64, Vec<Vec3>)> {
     Some((plane, rms, kept))
 }
 
-/// Compares the planes of several views of one flat surface, at least two.
+/// Compares the planes of at least two views of one flat surface.
 pub fn flat(views: &[(String, Vec<Vec3>)]) -> Result<FlatCheck> {
     let weak = |what: String| {
         Fault::refused(what)
@@ -92,7 +92,7 @@ pub fn flat(views: &[(String, Vec<Vec3>)]) -> Result<FlatCheck> {
     }
     let all: Vec<Vec3> = fits.iter().flat_map(|(_, f)| f.2.iter().copied()).collect();
     let (mut common, _) = fit_plane::<Base>(&all).ok_or_else(|| weak("the views together are no plane".into()))?;
-    // A fitted normal has no side of its own: heights count along the base axis that the surface faces most.
+    // The sign of a fitted normal is arbitrary: heights count along the base axis closest to the normal.
     if common.normal[common.normal.iamax()] < 0.0 {
         common = common.flipped();
     }
@@ -132,24 +132,24 @@ pub fn flat(views: &[(String, Vec<Vec3>)]) -> Result<FlatCheck> {
     })
 }
 
-/// A touch test: where the system said a point is, and where the robot's tip touched it.
+/// A touch test: predicted positions of points against the positions where the robot's tip touched them.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct TouchCheck {
-    /// How many pairs were compared.
+    /// Number of compared pairs.
     pub points: usize,
-    /// Mean of predicted − touched, mm: a constant part points to the tool or the hand-eye.
+    /// Mean of predicted − touched, mm. A constant offset points to the tool or the hand-eye calibration.
     pub mean_mm: [f64; 3],
-    /// Length of the errors, rms and worst, mm.
+    /// Length of the errors, rms, mm.
     pub rms_mm: f64,
     /// Length of the largest error, mm.
     pub worst_mm: f64,
-    /// Number of the worst pair, from 1.
+    /// Number of the pair with the largest error, from 1.
     pub worst: usize,
-    /// rms with the mean taken off, mm.
+    /// rms of the errors after the mean is subtracted, mm.
     pub scatter_mm: f64,
 }
 
-/// Compares predicted with touched points, both base frame, mm.
+/// Compares predicted with touched points, both in the base frame, mm.
 pub fn touch(pairs: &[(Vec3, Vec3)]) -> Result<TouchCheck> {
     if pairs.is_empty() {
         return Err(Fault::usage("no touched points").next("give at least one predicted and touched point"));
@@ -169,8 +169,8 @@ pub fn touch(pairs: &[(Vec3, Vec3)]) -> Result<TouchCheck> {
     })
 }
 
-/// Rows of six numbers: predicted x y z, touched x y z (mm), separated by commas or blanks. A first
-/// line of words and lines after # are skipped.
+/// Rows of six numbers: predicted x y z, touched x y z (mm), separated by commas or blanks. A heading line before
+/// the first row and text after # are skipped.
 pub fn read_touches(text: &str) -> Result<Vec<(Vec3, Vec3)>> {
     let mut out = Vec::new();
     for (number, line) in text.lines().enumerate() {

@@ -1,5 +1,5 @@
-//! In: stops and their fit. Out: which of them contradict the others, whether the line is bent, whether another order
-//! of the counts fits, and whether any order would.
+//! In: stops and their fit. Out: which stops contradict the others, whether the line is bent, whether the reversed
+//! order of the counts fits, and how well random orders fit.
 //! Frame and unit: camera frame, mm; squared distances in sigmas (docs/math.md, Axis (7), (8)).
 
 use super::fit::{Order, Stop, StopResidual};
@@ -10,7 +10,7 @@ use crate::geometry::{CountUnit, Vec3};
 use nalgebra::DMatrix;
 use rand::{SeedableRng, seq::SliceRandom};
 
-/// Random deals of the counts.
+/// Number of random permutations of the counts.
 const DEALS: u64 = 20;
 
 pub(super) fn order(seen: &[Seen], now: &Start, unit: CountUnit, seed: u64) -> Order {
@@ -19,7 +19,7 @@ pub(super) fn order(seen: &[Seen], now: &Start, unit: CountUnit, seed: u64) -> O
         let dealt: Vec<Seen> = seen.iter().zip(counts).map(|(s, c)| Seen { count: *c, ..s.clone() }).collect();
         start(&dealt, now.state.kind, unit).map_or(f64::INFINITY, |s| s.spread)
     };
-    // By their ranks: the first gets the last one's count.
+    // Reversed by rank: the stop with the lowest count gets the highest one.
     let mut ranks: Vec<usize> = (0..counts.len()).collect();
     ranks.sort_by(|a, b| counts[*a].total_cmp(&counts[*b]));
     let mut reversed = counts.clone();
@@ -30,7 +30,7 @@ pub(super) fn order(seen: &[Seen], now: &Start, unit: CountUnit, seed: u64) -> O
         let mut dealt = counts.clone();
         dealt.shuffle(&mut rand_pcg::Pcg64::seed_from_u64(seed.wrapping_add(k)));
         let stayed = dealt.iter().zip(&counts).filter(|(a, b)| a == b).count();
-        // A deal that leaves most where they were says nothing of chance, nor does one that turns them round.
+        // A permutation that leaves most counts in place, or reverses most of them, is no sample of chance.
         let turned = dealt.iter().zip(&reversed).filter(|(a, b)| a == b).count();
         if stayed.max(turned) * 3 > counts.len() { f64::INFINITY } else { with(&dealt) }
     };
@@ -41,15 +41,15 @@ pub(super) fn order(seen: &[Seen], now: &Start, unit: CountUnit, seed: u64) -> O
     }
 }
 
-/// What the stops say of each other.
+/// Check of the stops against each other.
 pub(super) struct Suspects {
-    /// Those of the fit.
+    /// Indices of the stops in the fit.
     pub used: Vec<usize>,
-    /// Squared distance of each from where the others predict it; 6 degrees of freedom.
+    /// Squared distance of each stop from the position that the others predict; 6 degrees of freedom.
     surprise: Vec<f64>,
-    /// The same over what is usual among the used, where that is more than chance.
+    /// The same divided by its usual size among the used stops, if that is larger than chance explains.
     beside: Vec<f64>,
-    /// The motion without that stop; none where the others determine none.
+    /// The motion without that stop; `None` where the others determine no motion.
     without: Vec<Option<State>>,
 }
 
@@ -73,13 +73,14 @@ impl Suspects {
         Suspects { used: used.to_vec(), surprise, beside, without }
     }
 
-    /// Those that the next round fits: the worst one leaves while enough are left, those that came near enter.
+    /// Stops of the next round's fit: the worst one leaves while enough remain; otherwise those within the gate
+    /// enter.
     pub fn within(&self, gate: f64, used: &[usize], round: usize) -> Vec<usize> {
         let worst = used.iter().copied().max_by(|a, b| self.beside[*a].total_cmp(&self.beside[*b]));
         if let Some(worst) = worst.filter(|w| self.beside[*w] > gate && used.len() > 3) {
             return used.iter().copied().filter(|i| *i != worst).collect();
         }
-        // Late rounds only take away, so that none goes in and out for ever.
+        // Late rounds only remove stops, so that none alternates between in and out.
         let enters = |i: usize| round < 6 && self.beside[i] <= gate;
         (0..self.beside.len()).filter(|&i| used.contains(&i) || enters(i)).collect()
     }
@@ -104,8 +105,9 @@ impl Suspects {
     }
 }
 
-/// Bow over the whole way, from end to middle, mm, and its sigma: what is left of the places over count, squared
-/// count beside the line. A linear axis that is bent and a table that does not run true both leave one.
+/// Bow over the whole travel, from end to middle, and its sigma, mm: fit of count and squared count, besides the
+/// line, to the residuals of the positions. A bent linear axis leaves one, and so does a table that does not run
+/// true.
 pub(super) fn bend(seen: &[&Seen], state: &State, scatter: &Scatter) -> [f64; 2] {
     if seen.len() < 4 {
         return [0.0, 0.0];

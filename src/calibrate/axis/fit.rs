@@ -1,4 +1,5 @@
-//! In: what is asked of an axis: stops with a board and a count. Out: what was found, and how far it puts a part wrong.
+//! In: the stops of an axis, each with a board and a count. Out: the fitted axis, and the position error that it
+//! causes at a part.
 //! Frame and unit: camera frame, mm, rad, counts.
 
 use crate::calibrate::measured_pose::MeasuredPose;
@@ -6,61 +7,60 @@ use crate::geometry::{Axis, AxisKind, Vec3, exp};
 use crate::solve::End;
 use nalgebra::DMatrix;
 
-/// One stop of the axis with the board that rides on it.
+/// One stop of the axis with the board that is mounted on it.
 #[derive(Clone, Debug)]
 pub struct Stop {
-    /// From the motion's zero.
+    /// Count from the motion's zero.
     pub count: f64,
-    /// The board before the camera, as the picture measured it.
+    /// Pose of the board in the camera frame, as measured in the picture.
     pub pose: MeasuredPose,
 }
 
-/// How one picture fits: its step from the expected to the seen board.
+/// Residual of one picture: the step from the expected board to the seen one.
 #[derive(Clone, Debug)]
 pub struct StopResidual {
-    /// Of the picture.
+    /// Name of the picture.
     pub name: String,
-    /// From the motion's zero.
+    /// Count from the motion's zero.
     pub count: f64,
-    /// In the fit; false: it contradicts the others and was left out.
+    /// True if the picture is in the fit; false if it contradicts the others and was excluded.
     pub used: bool,
-    /// Board corners, rms, mm; and with the picture left out of the fit.
+    /// Residual at the board corners, rms, mm.
     pub mm: f64,
-    /// Board corners with the picture left out of the fit, rms, mm.
+    /// Residual at the board corners with the picture excluded from the fit, rms, mm.
     pub holdout_mm: f64,
-    /// Squared distance from where the others predict it, in sigmas of both; 6 is usual.
+    /// Squared distance from the position that the others predict, in sigmas of both; 6 is usual.
     pub surprise: f64,
-    /// How far the board's middle was from its expected place, camera frame, mm.
+    /// Offset of the board's middle from its expected position, camera frame, mm.
     pub off: Vec3,
 }
 
 /// What [`super::solve::solve`] found.
 #[derive(Clone, Debug)]
 pub struct AxisFit {
-    /// The axis as found.
+    /// The fitted axis.
     pub axis: Axis,
-    /// Of dx dy dz pitch and for a turntable px py pz, as [`crate::rig::Kind::parameters`] names them; camera
-    /// uncertainty included.
+    /// Covariance of dx dy dz pitch and, for a turntable, px py pz, named as in [`crate::rig::Kind::parameters`];
+    /// includes the camera's uncertainty.
     pub covariance: DMatrix<f64>,
-    /// The same with the camera taken as exact.
+    /// The same covariance with the camera taken as exact.
     pub covariance_camera_exact: DMatrix<f64>,
-    /// One a stop, in the order given.
+    /// One entry per stop, in the order given.
     pub stops: Vec<StopResidual>,
-    /// What the axis scatters by from stop to stop beyond what pixels explain, per axis: mm, and rad about the
-    /// board's middle.
+    /// Scatter of the position from stop to stop beyond what the pixels explain, per axis, mm.
     pub sigma_mm: f64,
-    /// Scatter of the turn from stop to stop about the board's middle, per axis, rad.
+    /// Scatter of the rotation from stop to stop about the board's middle, per axis, rad.
     pub sigma_rad: f64,
     /// Squared distances over their degrees of freedom; near 1.
     pub chi2: f64,
-    /// What the variance was multiplied by, because scatter is known from few pictures.
+    /// Factor on the variance, because the scatter is estimated from few pictures.
     pub inflation: f64,
-    /// Counts of the used stops, and the board's corners and middle in axis coordinates at count 0.
+    /// Counts of the used stops.
     pub counts: Vec<f64>,
-    /// Corners of the board and then its middle, axis frame at count 0, mm.
+    /// Corners of the board and, last, its middle, axis frame at count 0, mm.
     pub landmarks: [Vec3; 5],
-    /// How far the used stops lie from a straight line as a bow over the whole way, mm, and its sigma; of a
-    /// turntable over the turn seen.
+    /// Bow of the used stops over the whole travel, as deviation from a straight line, and its sigma, mm. For a
+    /// turntable: over the observed rotation.
     pub bend_mm: [f64; 2],
     /// Whether the counts seem to belong to the pictures.
     pub order: Order,
@@ -68,21 +68,22 @@ pub struct AxisFit {
     pub end: End,
 }
 
-/// How the counts as they are compare with others.
+/// The fit with the stated counts compared with other orders of the counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Order {
-    /// Spread of the stops about their motion, mm.
+    /// Spread of the stops about their motion with the stated counts, mm.
     pub spread_mm: f64,
-    /// The same with the counts the other way round.
+    /// The spread with the counts in reverse order, mm.
     pub reversed_mm: f64,
-    /// The least of counts dealt out at random.
+    /// The smallest spread of random permutations of the counts, mm.
     pub dealt_mm: f64,
 }
 
 impl AxisFit {
-    /// Standard deviation of where a part that rides on the axis is put against where it stood in the middle of the
-    /// way, rms over the stops (on a turntable over a whole turn) and the board's corners, mm: of the axis as a
-    /// whole, and with its scatter from stop to stop and what its way bows by, which is used as straight.
+    /// Standard deviation of the position of a part on the axis, relative to its position at the middle of the
+    /// travel. It is the rms over the travel (on a turntable over a full turn) and the board's corners, mm. First by
+    /// the covariance of the axis alone; second with its scatter from stop to stop and the bow, which the straight
+    /// model ignores.
     pub fn expected_error(&self, covariance: &DMatrix<f64>) -> [f64; 2] {
         let (low, high) =
             self.counts.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), c| (a.min(*c), b.max(*c)));
@@ -92,7 +93,7 @@ impl AxisFit {
         }
     }
 
-    /// The same over so many counts to both sides of the middle of the way.
+    /// The same over this many counts to both sides of the middle of the travel.
     pub fn error_over(&self, covariance: &DMatrix<f64>, half: f64) -> [f64; 2] {
         let (low, high) =
             self.counts.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), c| (a.min(*c), b.max(*c)));
@@ -101,7 +102,7 @@ impl AxisFit {
             AxisKind::Linear => p + Vec3::x() * (self.axis.pitch * middle),
             AxisKind::Turntable => exp(&(Vec3::z() * (self.axis.pitch * middle))) * p,
         };
-        // Of a straight way chance leaves a bow too, as large as its sigma along each axis.
+        // Even for a straight travel chance leaves a bow, as large as its sigma along each axis.
         let [bow, chance] = self.bend_mm;
         let bow2 = (bow * bow - 3.0 * chance * chance).max(0.0);
         let (mut sum, mut bent, mut n) = (0.0, 0.0, 0.0);

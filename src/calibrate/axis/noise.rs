@@ -1,16 +1,16 @@
-//! In: stops and their fit. Out: what the axis itself scatters by from stop to stop, by restricted maximum likelihood.
+//! In: stops and their fit. Out: the axis' own scatter from stop to stop, by restricted maximum likelihood.
 //! Frame and unit: mm, rad per axis (docs/math.md, Axis (6)).
 
 use super::terms::{Fit, Scatter, Seen, information};
 use nalgebra::{DMatrix, DVector};
 
-/// Steps of the search for each of the two, in turns.
+/// Rounds and steps of the search: the two scatters are searched in turns.
 const ROUNDS: usize = 2;
 const STEPS: usize = 12;
-/// Gain in likelihood (2 ln L) below which there is no scatter of its own.
+/// Smallest gain in likelihood (2 ln L) for which the axis is given a scatter.
 const WORTH: f64 = 1.0;
 
-/// Of the axis: what maximises the likelihood of what the fit leaves.
+/// Scatter of the axis that maximises the likelihood of the fit's residuals.
 pub(super) fn estimate(seen: &[&Seen], fit: &Fit) -> Scatter {
     let left: Vec<_> = seen.iter().map(|s| (*s, fit.state.off(s), fit.state.jacobian(s.count))).collect();
     let cost = |s: &Scatter| {
@@ -23,7 +23,7 @@ pub(super) fn estimate(seen: &[&Seen], fit: &Fit) -> Scatter {
             g += &jw * e;
             sum += (e.transpose() * w * e)[0] - w.determinant().ln();
         }
-        // Scaled to one, so that counts and millimetres weigh alike.
+        // Scaled to a unit diagonal, so that counts and millimetres have equal weight.
         let d = h.diagonal().map(|x| 1.0 / x.sqrt());
         let scaled = DMatrix::from_fn(n, n, |i, k| h[(i, k)] * d[i] * d[k]);
         let Some(factor) = scaled.cholesky() else { return f64::INFINITY };
@@ -31,7 +31,7 @@ pub(super) fn estimate(seen: &[&Seen], fit: &Fit) -> Scatter {
         sum - g.dot(&factor.solve(&g)) + 2.0 * factor.l().diagonal().map(f64::ln).sum() - 2.0 * d.map(f64::ln).sum()
     };
     let none = Scatter { mm: 0.0, rad: 0.0 };
-    // Up to what is left in all.
+    // Upper limit of the search: twice the rms of the residuals.
     let rms = |from: usize| {
         let sum: f64 = left.iter().map(|(_, e, _)| e.fixed_rows::<3>(from).norm_squared()).sum();
         (sum / (3 * left.len()) as f64).sqrt()
@@ -42,7 +42,7 @@ pub(super) fn estimate(seen: &[&Seen], fit: &Fit) -> Scatter {
     for _ in 0..ROUNDS {
         for k in 0..2 {
             let at = |x: f64| if k == 0 { Scatter { mm: x, ..best.1 } } else { Scatter { rad: x, ..best.1 } };
-            // A ladder over two decades, then between its steps.
+            // Candidates over two decades, from the upper limit down, and zero.
             let tries: Vec<Scatter> =
                 (0..STEPS).map(|i| at(most[k] * 10f64.powf(-2.0 * i as f64 / (STEPS - 1) as f64))).collect();
             let ladder: Vec<(f64, Scatter)> = tries.into_iter().chain([at(0.0)]).map(|s| (cost(&s), s)).collect();
@@ -52,7 +52,7 @@ pub(super) fn estimate(seen: &[&Seen], fit: &Fit) -> Scatter {
     if bare - best.0 < WORTH { none } else { best.1 }
 }
 
-/// Share of the places' variance that is the axis' own, 0 to 1.
+/// Share of the positions' variance that comes from the axis' own scatter, 0 to 1.
 pub(super) fn share(seen: &[&Seen], scatter: &Scatter) -> f64 {
     let own = 3.0 * scatter.mm * scatter.mm;
     let all: f64 = seen.iter().map(|s| own / (own + s.covariance.fixed_view::<3, 3>(0, 0).trace()).max(1e-300)).sum();

@@ -1,5 +1,5 @@
-//! In: an axis' fit. Out: the verdict with reasons, figures and the next best picture, and the page a person reads;
-//! fit and verification apart.
+//! In: the fit of an axis. Out: the verdict with reasons, figures and the next best picture, and the report page; fit
+//! and verification are separate.
 //! Frame and unit: camera frame; mm, degrees.
 
 use super::fit::{AxisFit, StopResidual};
@@ -10,18 +10,19 @@ use crate::geometry::AxisKind;
 use crate::rig::{AXIS_SIGMA_DEG, AXIS_SIGMA_MM, Covariance, Kind, Quality, Verdict};
 use std::collections::BTreeMap;
 
-/// Lengths of board and axis may differ by this share before one of them is called wrong.
+/// Relative difference between the lengths of board and axis up to which neither counts as wrong.
 const SCALE_TOLERANCE: f64 = 0.01;
-/// Counts dealt out at random fit at this share of their spread or better: the true ones tell nothing.
+/// Largest spread of the stops, as a share of the smallest spread of random permutations, at which the counts count
+/// as right.
 const BY_CHANCE: f64 = 0.45;
-/// Reversed counts that fit within so many times the spread cannot be told from the true ones.
+/// Reversed counts within this many times the spread cannot be distinguished from the stated ones.
 const TOLD: f64 = 3.0;
-/// Turned by less, rad, a table's bearing is not seen all round.
+/// A table turned by less than this, rad, does not show its bearing all round.
 const HALF_TURN: f64 = std::f64::consts::PI;
-/// A bow of so many of its sigmas is one.
+/// A bow is significant beyond this many of its sigmas.
 const BENT: f64 = 4.0;
 
-/// The kind of calibration that a fit is.
+/// The kind of calibration that this fit belongs to.
 pub fn kind(fit: &AxisFit) -> Kind {
     match fit.axis.kind {
         AxisKind::Linear => Kind::LinearAxis,
@@ -29,7 +30,7 @@ pub fn kind(fit: &AxisFit) -> Kind {
     }
 }
 
-/// Under the names that the axis' file gives the parameters; camera uncertainty included.
+/// The covariance under the parameter names of the axis' file; includes the camera's uncertainty.
 pub fn covariance(fit: &AxisFit) -> Covariance {
     Covariance::new(kind(fit).parameters().0, &fit.covariance)
 }
@@ -38,16 +39,16 @@ pub fn covariance(fit: &AxisFit) -> Covariance {
 struct Evidence<'a> {
     fit: &'a AxisFit,
     used: Vec<&'a StopResidual>,
-    /// Expected error in all, its part by direction and pitch, and the camera's share of that part, mm.
+    /// Total expected error, its part by direction and pitch, and the camera's share of that part, mm.
     expected: f64,
     own: f64,
     camera_part: f64,
-    /// Least and greatest count, and the way between them, mm or rad.
+    /// Least and greatest count, and the travel between them, mm or rad.
     counts: [f64; 2],
     way: f64,
 }
 
-/// Judges a fit. `board_length` names what states the board's lengths.
+/// Judges a fit. `board_length` names the source of the board's lengths.
 pub fn judge(fit: &AxisFit, limits: &Limits, board_length: &str) -> Quality {
     let evidence = Evidence::of(fit);
     let Evidence { expected, own, way, .. } = evidence;
@@ -96,7 +97,7 @@ impl Evidence<'_> {
         }
     }
 
-    /// Whether the stops are enough, and by how much they scatter.
+    /// Checks that there are enough stops, and their scatter.
     fn scatter(&self, j: &mut Judgement) {
         let (fit, used) = (self.fit, self.used.len());
         j.at_best(Verdict::BadlyDetermined, used < 4, || format!("{used} stops leave nothing to check"));
@@ -114,7 +115,7 @@ impl Evidence<'_> {
         }
     }
 
-    /// What the error comes from, and the next best picture.
+    /// Reasons for the error, and the next best picture.
     fn advise(&self, j: &mut Judgement) {
         let Evidence { camera_part, way, .. } = *self;
         if camera_part > 0.0 {
@@ -157,7 +158,7 @@ impl Evidence<'_> {
     }
 }
 
-/// Whether the way is straight, or the table runs true.
+/// Checks that the travel is straight, or that the table runs true.
 fn bow(fit: &AxisFit, tolerance_mm: f64, j: &mut Judgement) {
     let [bow, sigma] = fit.bend_mm;
     let bent = bow > BENT * sigma && bow > 0.25 * tolerance_mm;
@@ -167,7 +168,7 @@ fn bow(fit: &AxisFit, tolerance_mm: f64, j: &mut Judgement) {
             "the way is bent: {bow:.4} mm from its ends to its middle, {sigma:.4} mm is chance; it is used as straight"
         )
     });
-    // Where a table's error lies farther round than the board was seen, nobody knows.
+    // The table's error at angles where the board was not seen is unknown.
     j.at_best(Verdict::BadlyDetermined, bent && !linear, || {
         format!(
             "the table does not run true: over the turn seen, the board's place bows by {bow:.4} mm, {sigma:.4} mm \
@@ -176,7 +177,7 @@ fn bow(fit: &AxisFit, tolerance_mm: f64, j: &mut Judgement) {
     });
 }
 
-/// Whether the board's lengths agree with the unit that the axis counts in.
+/// Checks that the board's lengths agree with the unit of the axis' counts.
 fn pitch(fit: &AxisFit, board_length: &str, j: &mut Judgement) {
     let Some(stated) = fit.axis.unit.stated() else { return };
     let unit = fit.axis.unit.name();
@@ -190,7 +191,7 @@ fn pitch(fit: &AxisFit, board_length: &str, j: &mut Judgement) {
     });
 }
 
-/// What the stops say against each other, and who says it.
+/// The stops that contradict the others, and the number that they contradict.
 fn contradictions(fit: &AxisFit, j: &mut Judgement) {
     for s in fit.stops.iter().filter(|s| !s.used) {
         j.at_best(Verdict::Usable, true, || {
@@ -206,7 +207,7 @@ fn contradictions(fit: &AxisFit, j: &mut Judgement) {
     overrule(used, fit.stops.len() - used, j);
 }
 
-/// Whether the counts are the pictures' own.
+/// Checks that the counts belong to the pictures.
 fn order(fit: &AxisFit, j: &mut Judgement) {
     let o = &fit.order;
     j.at_best(Verdict::BadlyDetermined, o.spread_mm > BY_CHANCE * o.dealt_mm, || {
@@ -234,7 +235,7 @@ fn order(fit: &AxisFit, j: &mut Judgement) {
     j.advise(untold, || "add a stop at an uneven distance from the others: then the counts' sense is seen".into());
 }
 
-/// The report.
+/// The report page.
 pub fn page(fit: &AxisFit, quality: &Quality) -> Page {
     let mut page = Page::new(&format!("Axis calibration: {}", fit.axis.kind.words()));
     page.verdict(quality);

@@ -1,4 +1,4 @@
-//! In: a board's poses at stops of a linear axis or turntable, with the counts there. Out: direction and pitch, or
+//! In: a board's poses at the stops of a linear axis or turntable, with their counts. Out: direction and pitch, or
 //! the axis of rotation, by maximum likelihood, with covariance, the axis' own scatter and hold-out errors.
 //! Frame and unit: camera frame, mm, rad, counts (docs/math.md, Axis (1) to (8)).
 
@@ -16,10 +16,10 @@ use crate::geometry::{AxisKind, CountUnit};
 /// Settings of [`solve`].
 #[derive(Clone, Debug)]
 pub struct AxisOptions {
-    /// A picture is left out whose board lies farther than this from where the others predict it: squared Mahalanobis
-    /// distance, 6 degrees of freedom; 26.1 leaves one good picture in 5,000 out. 12..=1000.
+    /// A picture is excluded if its board lies farther than this from the position that the others predict: squared
+    /// Mahalanobis distance, 6 degrees of freedom. 26.1 excludes one good picture in 5,000. 12..=1000.
     pub gate: f64,
-    /// Seed of the random deals of counts that the fit is compared with.
+    /// Seed of the random permutations of the counts that the fit is compared with.
     pub seed: u64,
 }
 
@@ -35,10 +35,10 @@ fn refused(what: String) -> Fault {
         .next("show the board at eight or more stops, unevenly apart, along as much of the travel as the camera sees")
 }
 
-/// Fits the axis. `camera_covariance` is that of the camera's parameters.
+/// Fits the axis. `camera_covariance` is the covariance of the camera's parameters.
 ///
 /// # Errors
-/// Fewer than three stops, counts that are all the same, boards that agree on no motion.
+/// Fewer than three stops, counts that are all equal, or boards that agree on no motion.
 pub fn solve(
     stops: &[Stop],
     kind: AxisKind,
@@ -97,14 +97,14 @@ pub fn solve(
     })
 }
 
-/// Motion and scatter that fit each other, and what the stops then say of each other.
+/// Motion and scatter that are consistent with each other, and the check of the stops against each other.
 struct Settled {
     fit: Fit,
     scatter: Scatter,
     suspects: Suspects,
 }
 
-/// Fits, leaves out what lies beyond the gate, and fits again until the same stops stay.
+/// Fits, excludes what lies beyond the gate, and fits again until the set of used stops no longer changes.
 fn settle(seen: &[Seen], first: Start, gate: f64) -> Result<Settled> {
     let undetermined = || refused("the stops do not determine the axis".into());
     let mut used = first.agreeing;
@@ -130,12 +130,12 @@ fn settle(seen: &[Seen], first: Start, gate: f64) -> Result<Settled> {
     Ok(settled.expect("at least one round"))
 }
 
-/// Squared distances over their degrees of freedom, and what the variance is multiplied by for being known from few
+/// Squared distances over their degrees of freedom, and the factor on the variance for a scatter estimated from few
 /// stops.
 fn misfit(chosen: &[&Seen], fit: &Fit, scatter: &Scatter) -> (f64, f64) {
     let freedom = (6 * chosen.len()) as f64 - fit.covariance.nrows() as f64;
     let chi2 = if freedom > 0.0 { fit.cost / freedom } else { 1.0 };
-    // Of places alone: turns say little of a line.
+    // Degrees of freedom of the positions alone: rotations say little about a line.
     let few = 3.0 * chosen.len() as f64 - (fit.covariance.nrows() as f64 - 3.0);
     let share = noise::share(chosen, scatter);
     (chi2, inflation(chi2.max(1.0) + share, few) / (1.0 + share))

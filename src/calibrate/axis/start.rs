@@ -1,30 +1,30 @@
-//! In: boards at stops, of which some may be wrong. Out: the motion that most of them agree on, those that agree, and
-//! how far they scatter about it. Every pair (on a turntable: neighbours) proposes one; the one that the median stop
-//! likes best is taken.
+//! In: boards at stops, some of which may be wrong. Out: the motion that most of them agree on, the stops that agree,
+//! and their scatter about it. Every pair (on a turntable: neighbours) proposes a motion. The proposal with the
+//! smallest median distance to the stops wins.
 //! Frame and unit: camera frame, mm, rad, counts (docs/math.md, Axis (5)).
 
 use super::terms::{Scatter, Seen, State};
 use crate::geometry::{AxisKind, CountUnit, Mat3, Vec3, log};
 
-/// Where to start from.
+/// Start values of the fit.
 pub(super) struct Start {
     pub state: State,
     pub agreeing: Vec<usize>,
     pub scatter: Scatter,
-    /// Median distance of the stops from where it expects them, mm.
+    /// Median distance of the stops from their expected positions, mm.
     pub spread: f64,
 }
 
-/// Share of the stops that must lie near for a proposal to be good: more than half, so that two halves do not tie.
+/// Share of the stops that must lie near a proposal. It is above one half, so that two halves cannot tie.
 const MAJORITY: f64 = 0.6;
-/// Stops within so many times the usual distance agree at first.
+/// Stops within this many times the usual distance count as agreeing at first.
 const NEAR: f64 = 4.0;
-/// Neighbours on a turntable that propose: each stop with the next ones.
+/// Pairs on a turntable: each stop with this many next ones.
 const REACH: usize = 3;
-/// A stated pitch may be off by this share before a proposal counts as another turn.
+/// Relative deviation from the stated pitch beyond which a proposal counts as a different rotation.
 const OFF: f64 = 0.3;
 
-/// Distance of a stop from where the state expects it, mm: the turn counts at the board's corners.
+/// Distance of a stop from its expected position, mm; the rotation counts by its effect at the board's corners.
 fn distance(state: &State, s: &Seen) -> f64 {
     let e = state.off(s);
     e.fixed_rows::<3>(0).norm().hypot(s.arm * e.fixed_rows::<3>(3).norm())
@@ -52,7 +52,7 @@ pub(super) fn start(seen: &[Seen], kind: AxisKind, unit: CountUnit) -> Option<St
     };
     let best = proposals.into_iter().map(|p| (spread(&p), p)).filter(|p| p.0.is_finite());
     let (spread, state) = best.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    // What pixels alone make of it at least: a spread of three exact stops is nothing.
+    // At least the sigma of the pixels alone: the spread of three exact stops is zero.
     let pixels = seen.iter().map(|s| s.covariance.fixed_view::<3, 3>(0, 0).trace().sqrt()).fold(0.0, f64::max);
     let limit = NEAR * spread.max(pixels);
     let agreeing: Vec<usize> = (0..seen.len()).filter(|&i| distance(&state, &seen[i]) <= limit).collect();
@@ -63,7 +63,7 @@ pub(super) fn start(seen: &[Seen], kind: AxisKind, unit: CountUnit) -> Option<St
 
 fn state(kind: AxisKind, along: Vec3, pitch: f64, point: Vec3, s: &Seen) -> State {
     let mut out = State { kind, along, pitch, point, place: s.place, turn: s.turn, middle: s.middle };
-    // Back from the stop to count 0.
+    // From the stop back to count 0.
     match kind {
         AxisKind::Linear => out.place -= along * s.count,
         AxisKind::Turntable => (out.place, out.turn) = out.expected(-s.count),
@@ -77,7 +77,7 @@ fn line(a: &Seen, b: &Seen) -> Option<State> {
     good.then(|| state(AxisKind::Linear, along, 0.0, Vec3::zeros(), a))
 }
 
-/// Less than half a turn from one to the other, unless the unit says how far.
+/// The rotation between the two stops is less than half a turn unless the unit states the pitch.
 fn turn(a: &Seen, b: &Seen, unit: CountUnit) -> Option<State> {
     let counts = b.count - a.count;
     let rotation = b.turn * a.turn.transpose();
@@ -89,12 +89,12 @@ fn turn(a: &Seen, b: &Seen, unit: CountUnit) -> Option<State> {
     let d = w / angle;
     let mut pitch = angle / counts;
     if let Some(stated) = unit.stated() {
-        // Of all angles that look the same the one that is stated, either way round.
+        // Of all angles that give the same rotation, the one closest to the stated pitch, in either direction.
         let whole = std::f64::consts::TAU;
         let candidates = [stated * counts, -stated * counts].map(|by| angle + whole * ((by - angle) / whole).round());
         pitch = candidates.into_iter().map(|c| c / counts).find(|k| (k.abs() / stated - 1.0).abs() < OFF)?;
     }
-    // (1 - R) q = b - R a, and q anywhere along d: across it.
+    // (1 - R) q = b - R a leaves q free along d: the component along d is set to zero.
     let m = Mat3::identity() - rotation + d * d.transpose();
     let moved = b.place - rotation * a.place;
     let point = m.try_inverse()? * (moved - d * d.dot(&moved));

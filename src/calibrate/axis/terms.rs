@@ -1,6 +1,7 @@
-//! In: boards at stops, a motion. Out: where the motion expects each board, how that moves with the unknowns, the
-//! least-squares fit, and how it follows the camera.
-//! Frame and unit: camera frame; the board's middle, mm, and its turn, rad (docs/math.md, Axis (1) to (4)).
+//! In: boards at stops, a motion. Out: the board that the motion expects at each stop with its derivatives by the
+//! unknowns, the least-squares fit, and its derivatives by the camera's parameters.
+//! Frame and unit: camera frame; position of the board's middle, mm, and its rotation, rad (docs/math.md, Axis (1) to
+//! (4)).
 
 use super::fit::Stop;
 use crate::calibrate::measured_pose::ByIntrinsics;
@@ -8,8 +9,8 @@ use crate::geometry::{Axis, AxisKind, Board, Camera, CountUnit, Mat3, Riding, Ri
 use crate::solve::{End, LmOptions, Problem, Residuals, lm};
 use nalgebra::{DMatrix, Matrix6, Vector6};
 
-/// What the axis itself scatters by from stop to stop: standard deviations per axis of the board's middle, mm, and of
-/// its turn, rad.
+/// The axis' own scatter from stop to stop: standard deviations per axis of the board's middle, mm, and of its
+/// rotation, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scatter {
     pub mm: f64,
@@ -23,26 +24,26 @@ impl Scatter {
     }
 }
 
-/// A board at a stop, as a measurement of its middle's place and of its turn.
+/// A board at a stop, as a measurement of the position of its middle and of its rotation.
 #[derive(Clone, Debug)]
 pub(super) struct Seen {
     pub count: f64,
     pub place: Vec3,
     pub turn: Mat3,
-    /// Of (place, turn), from the pixels; mm, rad.
+    /// Covariance of (place, turn) by the pixels; mm, rad.
     pub covariance: Matrix6<f64>,
     pub by_intrinsics: ByIntrinsics,
-    /// The board's middle in its own frame, and how far its corners are from it, mm.
+    /// The board's middle in the board frame, and the distance of its corners from it, mm.
     pub middle: Vec3,
     pub arm: f64,
 }
 
 impl Seen {
-    /// `factor` makes the stated sigmas of the features true; `None` for a pose that pixels do not determine.
+    /// `factor` corrects the features' stated sigmas. `None` for a pose that the pixels do not determine.
     pub fn new(stop: &Stop, factor: f64) -> Option<Seen> {
         let pose = &stop.pose;
         let place = pose.centre();
-        // From a step about the camera's centre to the middle's own.
+        // From a step about the camera's centre to a step about the board's middle.
         let mut to = Matrix6::identity();
         to.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(&place));
         let covariance = to * pose.covariance(pose.factor_among(factor)) * to.transpose();
@@ -63,25 +64,25 @@ impl Seen {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct State {
     pub kind: AxisKind,
-    /// Linear: mm a count, as a vector; turntable: of unit length.
+    /// Linear: travel per count as a vector, mm. Turntable: direction of the axis, of unit length.
     pub along: Vec3,
-    /// rad a count; of a turntable.
+    /// Rotation per count, rad; turntable only.
     pub pitch: f64,
-    /// On a turntable's axis, mm.
+    /// A point on the turntable's axis, mm.
     pub point: Vec3,
     pub place: Vec3,
     pub turn: Mat3,
     pub middle: Vec3,
 }
 
-/// Two directions across a third.
+/// Two unit vectors perpendicular to `d` and to each other.
 pub(super) fn across(d: &Vec3) -> [Vec3; 2] {
     let a = d.cross(&if d.x.abs() < 0.8 { Vec3::x() } else { Vec3::y() }).normalize();
     [a, d.cross(&a)]
 }
 
 impl State {
-    /// Place and turn of the board at a count.
+    /// Expected position and rotation of the board at a count.
     pub fn expected(&self, count: f64) -> (Vec3, Mat3) {
         match self.kind {
             AxisKind::Linear => (self.place + self.along * count, self.turn),
@@ -91,7 +92,7 @@ impl State {
             }
         }
     }
-    /// From the expected board to the seen one.
+    /// Step from the expected board to the seen one.
     pub fn off(&self, s: &Seen) -> Vector6<f64> {
         let (place, turn) = self.expected(s.count);
         let (p, w) = (s.place - place, log(&(s.turn * turn.transpose())));
@@ -100,8 +101,8 @@ impl State {
     pub fn width(&self) -> usize {
         if self.kind == AxisKind::Linear { 9 } else { 11 }
     }
-    /// d(expected place and turn) over the unknowns: 3 of the motion or 2 of the direction, 2 of the point, the
-    /// pitch; then 3 of the place and 3 of the turn at count 0.
+    /// d(expected position and rotation)/d(unknowns). The unknowns of the motion come first: linear 3; turntable 2 of
+    /// the direction, 2 of the point and the pitch. Then follow 3 of the position and 3 of the rotation at count 0.
     pub fn jacobian(&self, count: f64) -> DMatrix<f64> {
         let n = self.width();
         let mut j = DMatrix::zeros(6, n);
@@ -118,7 +119,7 @@ impl State {
             j.view_mut((3, k), (3, 1)).copy_from(&w);
         };
         for (k, t) in across(&d).into_iter().enumerate() {
-            // The rotation group's left Jacobian for a step across the axis.
+            // The rotation group's left Jacobian for a step perpendicular to the axis.
             let w = t * by.sin() + d.cross(&t) * (1.0 - by.cos());
             put(k, w.cross(&arm), w);
             put(2 + k, t - r * t, Vec3::zeros());
@@ -144,7 +145,7 @@ impl State {
         next.turn = exp(&v(n - 3)) * self.turn;
         next
     }
-    /// The board at count 0.
+    /// Pose of the board at count 0.
     pub fn board(&self) -> Rigid<Camera, Board> {
         Rigid::new(self.turn, self.place - self.turn * self.middle)
     }
@@ -155,7 +156,7 @@ impl State {
         };
         Axis::from_board(&Riding { kind: self.kind, unit, direction, point: self.point, pitch }, &self.board())
     }
-    /// d(dx dy dz pitch px py pz) over the unknowns.
+    /// d(dx dy dz pitch px py pz)/d(unknowns).
     pub fn to_parameters(self, axis: &Axis) -> DMatrix<f64> {
         let d = axis.direction();
         if self.kind == AxisKind::Linear {
@@ -166,7 +167,7 @@ impl State {
                 (i, c) => (if i == c { 1.0 } else { 0.0 } - d[i] * d[c]) / k,
             });
         }
-        // The axis may point the other way: direction and pitch change sign together.
+        // The axis may point in the opposite direction: direction and pitch then change sign together.
         let sign = d.dot(&self.along).signum();
         let far = self.along.dot(&(axis.origin() - self.point));
         let t = across(&self.along);
@@ -180,11 +181,11 @@ impl State {
     }
 }
 
-/// A fit and what it leaves.
+/// A fit with its covariance and its remaining cost.
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
     pub state: State,
-    /// Of the unknowns.
+    /// Covariance of the unknowns.
     pub covariance: DMatrix<f64>,
     pub cost: f64,
     /// Whether it is a minimum.
@@ -197,7 +198,7 @@ struct Stops<'a> {
     width: usize,
 }
 
-/// Information of a stop, the axis' own scatter beside the pixels'.
+/// Information matrix of a stop: pixel noise plus the axis' own scatter.
 pub(super) fn information(s: &Seen, scatter: &Scatter) -> Option<Matrix6<f64>> {
     Some((s.covariance + scatter.covariance()).cholesky()?.inverse())
 }
@@ -221,7 +222,7 @@ impl Problem for Stops<'_> {
     }
 }
 
-/// Least squares over these stops; `None` where they do not determine the axis.
+/// Least squares over these stops; `None` if they do not determine the axis.
 pub(super) fn fitted(seen: &[&Seen], start: &State, scatter: &Scatter) -> Option<Fit> {
     let roots =
         seen.iter().map(|s| Some(information(s, scatter)?.cholesky()?.l().transpose())).collect::<Option<Vec<_>>>()?;
@@ -231,7 +232,7 @@ pub(super) fn fitted(seen: &[&Seen], start: &State, scatter: &Scatter) -> Option
     Some(Fit { covariance: found.covariance?, state: found.state, cost, end })
 }
 
-/// d(unknowns) over the camera's parameters: all boards are seen with the same camera.
+/// d(unknowns)/d(camera's parameters): all boards are seen with the same camera.
 pub(super) fn by_camera(seen: &[&Seen], fit: &Fit, scatter: &Scatter) -> DMatrix<f64> {
     let mut sum = DMatrix::zeros(fit.state.width(), crate::camera::PARAMETERS);
     for s in seen {

@@ -1,4 +1,4 @@
-//! In: a profile of a ball. Out: the circle that its points lie on, with its information.
+//! In: a profile of a ball. Out: the circle through its points, with its information matrix.
 //! Frame and unit: the sensor's plane y = 0, mm; docs/math.md, Ball (2).
 
 use super::options::BallOptions;
@@ -7,13 +7,14 @@ use crate::fault::{Fault, Result};
 use crate::geometry::{Mat3, Vec3};
 use crate::solve::{ConsensusOptions, LmOptions, Loss, Problem, Residuals, consensus, lm};
 
-/// A profile as a measurement: centre x, z and radius of the circle, with information per point variance.
+/// A profile as a measurement: centre x, z and radius of the circle. The information matrix holds for a point
+/// variance of 1 mm².
 pub(in crate::calibrate) struct Circle {
     pub value: Vec3,
     pub information: Mat3,
-    /// The points on the ball.
+    /// The profile's points on the ball.
     pub on: Vec<[f64; 2]>,
-    /// Their number, and that of the profile's points.
+    /// Number of points on the ball, and number of points in the profile.
     pub points: [usize; 2],
     /// Weighted sum of the squared distances from the circle, mm².
     pub squares: f64,
@@ -42,7 +43,7 @@ impl Problem for CircleFit<'_> {
     }
 }
 
-/// The circle that most points of a profile lie on; its radius may not exceed the ball's.
+/// Fits the circle that most points of a profile lie on; its radius may not exceed the ball's.
 pub(in crate::calibrate) fn circle(profile: &Profile, radius: f64, o: &BallOptions) -> Result<Circle> {
     let p = &profile.points;
     let options = ConsensusOptions { threshold: o.gate_mm, max_draws: 4000, seed: o.seed, ..Default::default() };
@@ -70,8 +71,8 @@ pub(in crate::calibrate) fn circle(profile: &Profile, radius: f64, o: &BallOptio
     if found.inliers.len() < 8 {
         return Err(weak(format!("only {} points lie on a circle, 8 are needed", found.inliers.len())));
     }
-    // A sensor sees one half of the ball: what lies opposite to most points (the table that the ball
-    // stands on) is near the circle by chance.
+    // A sensor sees only one half of the ball. Points opposite to most of the others (on the table that the ball
+    // stands on) are close to the circle by chance.
     let towards = |q: &[f64; 2]| nalgebra::Vector2::new(q[0] - found.model.x, q[1] - found.model.y).normalize();
     let middle: nalgebra::Vector2<f64> = found.inliers.iter().map(|&i| towards(&p[i])).sum();
     let on: Vec<[f64; 2]> = found.inliers.iter().map(|&i| p[i]).filter(|q| towards(q).dot(&middle) > 0.0).collect();

@@ -1,5 +1,5 @@
-//! In: profiles of a ball, robot poses, and a sensor's pose on the flange that came from elsewhere. Out: how well the
-//! profiles meet in one ball with it: only the ball's centre is fitted.
+//! In: profiles of a ball, robot poses, and a sensor's pose on the flange from another source. Out: how well the
+//! profiles agree on one ball with that pose; only the ball's centre is fitted.
 //! Frame and unit: flange_from_sensor, ball in the base frame; mm.
 
 use super::circle::circle;
@@ -12,19 +12,20 @@ use crate::solve::{LmOptions, Loss, Problem, Residuals, lm};
 /// What [`evaluate`] found.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Evaluation {
-    /// The centre that the profiles' points agree on best, base frame, mm.
+    /// The centre that fits the profiles' points best, base frame, mm.
     #[serde(rename = "ball_mm", serialize_with = "as_list")]
     pub ball: Vec3,
     /// Distance of the ball's points from the sphere of the stated diameter: rms over all points, mm.
     #[serde(rename = "rms_mm")]
     pub rms: f64,
-    /// The same with the diameter left free, and that diameter, mm.
+    /// The same rms with the diameter fitted too, mm.
     #[serde(rename = "free_rms_mm")]
     pub free_rms: f64,
     /// The diameter that fits the points best, mm.
     #[serde(rename = "free_diameter_mm")]
     pub free_diameter: f64,
-    /// A profile: its name, its points on the ball, the rms of their distances from the sphere, mm.
+    /// One entry per profile: its name, the number of its points on the ball, and the rms of their distances from the
+    /// sphere, mm.
     pub profiles: Vec<(String, usize, f64)>,
 }
 
@@ -32,7 +33,7 @@ fn as_list<S: serde::Serializer>(v: &Vec3, s: S) -> std::result::Result<S::Ok, S
     s.collect_seq(v.iter())
 }
 
-/// Points of the ball in the base frame, and the sphere's radius where it is known.
+/// Points of the ball in the base frame, and the sphere's radius if it is known.
 struct Sphere<'a> {
     points: &'a [Vec3],
     radius: Option<f64>,
@@ -63,10 +64,10 @@ impl Problem for Sphere<'_> {
     }
 }
 
-/// Puts the profiles into the base frame by the given transform and fits the ball. Profile i belongs to pose i.
+/// Transforms the profiles into the base frame by the given pose and fits the ball. Profile i belongs to pose i.
 ///
 /// # Errors
-/// As many poses as profiles are wanted, and a circle in every profile.
+/// Different numbers of poses and profiles, or a profile without a circle.
 pub fn evaluate(
     profiles: &[Profile],
     poses: &[Rigid<Base, Flange>],
@@ -116,7 +117,7 @@ pub fn evaluate(
     })
 }
 
-/// The centre of the sphere through the points, linear in the squares of their coordinates.
+/// The centre of the sphere through the points, by a fit that is linear in the squares of their coordinates.
 fn centre(points: &[Vec3]) -> Option<Vec3> {
     let mean = points.iter().sum::<Vec3>() / points.len() as f64;
     let square = points.iter().map(|p| (p - mean).norm_squared()).sum::<f64>() / points.len() as f64;

@@ -1,20 +1,20 @@
-//! Takes points out of profiles whose z means "not measured", and names a z that looks as if it did.
+//! Removes profile points whose z means "not measured", and reports a z that seems to mean it.
 
 use super::profile::Profile;
 use crate::raster::Kind;
 use crate::solve::repeated;
 
-/// Profiles without what was not measured, what is suspected, and both in words.
+/// Profiles without unmeasured points, the suspected z values, and warnings about both.
 pub struct Cleaned {
     /// The profiles.
     pub profiles: Vec<Profile>,
     /// The z that most points share, mm. If many points share it, it may stand for "not measured".
     pub suspects: Vec<f64>,
-    /// A sentence each.
+    /// One sentence per warning.
     pub warnings: Vec<String>,
 }
 
-/// Takes the points with the z `missing` out.
+/// Removes the points whose z equals `missing`.
 pub fn cleaned(mut profiles: Vec<Profile>, missing: Option<f64>) -> Cleaned {
     let count = |profiles: &[Profile]| profiles.iter().map(|p| p.points.len()).sum::<usize>();
     let all = count(&profiles);

@@ -1,4 +1,4 @@
-//! In: what a person may choose about a ball. Out: the choice, checked.
+//! In: a user's settings for the ball calibration. Out: the checked settings.
 //! Frame and unit: mm.
 
 use crate::fault::{Fault, Result};
@@ -29,19 +29,19 @@ impl std::str::FromStr for Side {
 pub struct BallOptions {
     /// The ball's diameter, mm; 1..=1000.
     pub diameter: f64,
-    /// The side of the ball in every profile; `None`: the data must tell.
+    /// The side of the profile plane on which the ball lies in every profile; `None`: determined from the data.
     pub side: Option<Side>,
-    /// A point farther than this from the circle of its profile is not of the ball, mm; 0.001..=10.
+    /// A point farther than this from the circle of its profile is not on the ball, mm; 0.001..=10.
     pub gate_mm: f64,
-    /// A profile is wrong where its squared Mahalanobis distance (3 degrees of freedom) exceeds this; 12..=1000.
+    /// A profile counts as wrong if its squared Mahalanobis distance (3 degrees of freedom) exceeds this; 12..=1000.
     pub gate: f64,
     /// The other side must fit worse by this many units of squared Mahalanobis distance; 9..=1000.
     pub clear: f64,
-    /// Fewest profiles; 6..=1000.
+    /// Smallest number of profiles; 6..=1000.
     pub min_profiles: usize,
-    /// Same seed, same result.
+    /// Random seed; the same seed gives the same result.
     pub seed: u64,
-    /// The z of a point where nothing was measured, mm.
+    /// The z that stands for a point without a measurement, mm.
     pub missing: Option<f64>,
 }
 
@@ -59,7 +59,7 @@ impl BallOptions {
             missing: None,
         }
     }
-    /// Refuses values out of the ranges that the fields state.
+    /// Refuses values outside the ranges stated at the fields.
     pub fn check(&self) -> Result<()> {
         let ranges = [
             ("diameter", self.diameter, 1.0, 1000.0),

@@ -7,8 +7,8 @@ use crate::fault::{Fault, Result};
 use crate::files::{TableRow, natural, table};
 use std::path::Path;
 
-/// Reads profiles from a file with many, or from a folder with a file each, in the order of their
-/// names (numbers in names count as numbers).
+/// Reads profiles from one file with many, or from a folder with one file each, in the order of their names (numbers
+/// in names are compared as numbers).
 pub fn load(path: &Path) -> Result<Vec<Profile>> {
     if !path.is_dir() {
         return load_file(path);
@@ -47,14 +47,14 @@ fn load_file(path: &Path) -> Result<Vec<Profile>> {
 
 /// What the columns of a table hold.
 enum Columns {
-    /// A point a line, of one profile or of the one that the line names.
+    /// One point per line, of a single profile or of the profile that the line names.
     Point { profile: Option<usize>, x: usize, z: usize },
-    /// A profile a line: x and z by turns.
+    /// One profile per line: x and z alternate.
     Profile,
 }
 
 impl Columns {
-    /// By a header; `None` where it names no x and z.
+    /// From a header; `None` if it names no x and z.
     fn named(cells: &[String]) -> Option<Columns> {
         let find = |key: &str| {
             cells.iter().position(|c| {
@@ -75,14 +75,14 @@ impl Columns {
     }
 }
 
-/// Columns x, z (one profile), or profile, x, z (many). A header may name them in another order.
+/// Columns x, z (one profile), or profile, x, z (many). A header may name the columns in another order.
 pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
     let first = text.lines().map(str::trim).find(|l| !l.is_empty() && !l.starts_with('#')).unwrap_or_default();
     let separator = [';', ','].into_iter().find(|c| first.contains(*c)).unwrap_or(' ');
     let mut columns: Option<Columns> = None;
     let mut out: Vec<Profile> = Vec::new();
     for TableRow { line: number, text: line, mut cells } in table(text, separator) {
-        // A separator at a line's end parts nothing.
+        // A separator at the end of a line starts no new cell.
         while cells.last().is_some_and(String::is_empty) {
             cells.pop();
         }
@@ -132,7 +132,7 @@ pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
     Ok(out)
 }
 
-/// Every matrix of an OpenCV FileStorage file: 2 x N, N x 2, or N elements of two channels.
+/// Reads every matrix of an OpenCV FileStorage file: 2 x N, N x 2, or N elements of two channels.
 pub fn from_yaml(text: &str, stem: &str) -> Result<Vec<Profile>> {
     let bad = |name: &str, what: String| {
         Fault::input(format!("matrix '{name}': {what}"))
@@ -157,7 +157,7 @@ pub fn from_yaml(text: &str, stem: &str) -> Result<Vec<Profile>> {
     Ok(out)
 }
 
-/// The points of one matrix, or what is wrong with it.
+/// The points of one matrix, or a description of its fault.
 fn matrix(body: &str) -> std::result::Result<Vec<[f64; 2]>, String> {
     let field = |key: &str| {
         body.lines().find_map(|l| l.trim().strip_prefix(key)?.trim_start().strip_prefix(':').map(str::trim))

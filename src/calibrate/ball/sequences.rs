@@ -1,19 +1,20 @@
-//! In: text with sequences of numbers in brackets, as JSON, YAML and cv::FileStorage write vectors, or a profile a
-//! line. Out: profiles. Both readings of numbers that stand in one row are told apart, or it is refused.
+//! In: text with sequences of numbers in brackets, as JSON, YAML and cv::FileStorage write vectors, or with one
+//! profile per line. Out: profiles. Numbers in one row can alternate x and z or give all x first: the second order is
+//! detected and refused.
 //! Frame and unit: the sensor's own plane, mm.
 
 use super::profile::Profile;
 use crate::fault::{Fault, Result};
 
-/// A bracket without brackets in it: the key before it, the bracket it stands in, its numbers.
+/// A bracket that contains no other bracket: the key before it, its enclosing bracket, its numbers.
 struct Sequence {
     key: String,
     parent: usize,
     numbers: Vec<f64>,
 }
 
-/// Profiles from brackets: pairs `[x, z]` that stand together are one profile; a longer sequence is a profile of
-/// its own, x and z by turns.
+/// Profiles from brackets: adjacent pairs `[x, z]` form one profile. A longer sequence is a separate profile in which
+/// x and z alternate.
 pub fn from_brackets(text: &str, stem: &str) -> Result<Vec<Profile>> {
     let mut out: Vec<Profile> = Vec::new();
     let mut open: Option<(usize, String)> = None;
@@ -40,8 +41,8 @@ pub fn from_brackets(text: &str, stem: &str) -> Result<Vec<Profile>> {
     Ok(out)
 }
 
-/// The profile of a row of numbers: x and z by turns. Refused: an odd count, and numbers that run on smoothly only
-/// when all x come before all z.
+/// The profile of a row of numbers in which x and z alternate. Refused: an odd count, and numbers that form a smooth
+/// curve only if all x come before all z.
 pub fn by_turns(numbers: &[f64], name: &str) -> Result<Vec<[f64; 2]>> {
     let refuse = |what: String| {
         Fault::input(format!("{name}: {what}"))
@@ -52,7 +53,7 @@ pub fn by_turns(numbers: &[f64], name: &str) -> Result<Vec<[f64; 2]>> {
         return Err(refuse(format!("{} numbers in a row, an even count of 6 or more is a profile", numbers.len())));
     }
     let points: Vec<[f64; 2]> = numbers.chunks(2).map(|c| [c[0], c[1]]).collect();
-    // How far a profile's numbers jump from point to point: the right reading is the smooth one.
+    // Sum of the steps between neighbouring points: the correct reading is the smooth one.
     let jumps = |at: &dyn Fn(usize) -> [f64; 2]| -> f64 {
         let steps = (1..points.len()).map(|i| (at(i)[0] - at(i - 1)[0]).abs() + (at(i)[1] - at(i - 1)[1]).abs());
         steps.filter(|s| s.is_finite()).sum()
@@ -69,7 +70,7 @@ pub fn by_turns(numbers: &[f64], name: &str) -> Result<Vec<[f64; 2]>> {
 
 fn sequences(text: &str) -> Result<Vec<Sequence>> {
     let mut out = Vec::new();
-    // Brackets that are open: their number, and whether a bracket stood in them.
+    // Open brackets: their number, and whether they contain a bracket.
     let mut stack: Vec<(usize, bool)> = Vec::new();
     let (mut count, mut key, mut numbers) = (0, String::new(), Vec::new());
     for (at, line) in text.lines().enumerate() {
@@ -113,7 +114,7 @@ fn sequences(text: &str) -> Result<Vec<Sequence>> {
     }
 }
 
-/// A number as YAML and JSON write it; a place without a measurement is not finite.
+/// A number in YAML or JSON notation; a missing measurement becomes a value that is not finite.
 pub fn value(text: &str) -> Option<f64> {
     match text.trim_start_matches('+').to_lowercase().as_str() {
         ".nan" | "nan" | "null" => Some(f64::NAN),

@@ -1,5 +1,5 @@
-//! In: profiles of a ball seen by a line-profile sensor, and the robot's poses. Out: the sensor's pose
-//! on the flange and the ball's centre by maximum likelihood, the ball's side of the profile plane known.
+//! In: profiles of a ball by a line-profile sensor, and the robot's poses. Out: the sensor's pose on the flange and
+//! the ball's centre by maximum likelihood, and the ball's side of the profile plane.
 //! Frame and unit: flange_from_sensor, ball in the base frame; mm, rad (docs/math.md, Ball (1) to (6)).
 
 use super::circle::{Circle, circle};
@@ -11,43 +11,43 @@ use crate::geometry::{Base, Flange, LeftStep, Mat3, Rigid, Sensor, Vec3, orthono
 use crate::solve::{End, LmOptions, Loss, Problem, Residuals, lm};
 use nalgebra::{DMatrix, DVector, SMatrix};
 
-/// How one profile fits.
+/// Residuals of one profile.
 #[derive(Clone, Debug)]
 pub struct ProfileResidual {
-    /// Of the profile.
+    /// Name of the profile.
     pub name: String,
-    /// In the fit; false: it disagreed and was left out.
+    /// True if the profile is in the fit; false if it disagreed and was excluded.
     pub used: bool,
-    /// Points on the ball, and points in the profile.
+    /// Number of points on the ball, and number of points in the profile.
     pub points: [usize; 2],
     /// Length of the residual of centre and radius, mm.
     pub mm: f64,
-    /// The same with the profile left out of the fit, mm; infinite where the others determine nothing.
+    /// The same with the profile excluded from the fit, mm; infinite if the others determine no fit.
     pub holdout_mm: f64,
     /// Squared Mahalanobis distance, 3 degrees of freedom.
     pub distance2: f64,
-    /// The ball's centre over the profile plane, mm, with its side.
+    /// Signed distance of the ball's centre from the profile plane, mm.
     pub height: f64,
 }
 
 /// What [`solve`] found.
 #[derive(Clone, Debug)]
 pub struct BallFit {
-    /// The sensor on the flange, mm.
+    /// Pose of the sensor on the flange, mm.
     pub flange_from_sensor: Rigid<Flange, Sensor>,
-    /// Ball's centre in the base frame, mm.
+    /// Centre of the ball in the base frame, mm.
     pub ball: Vec3,
     /// tx ty tz (mm) rx ry rz (rad, left, flange frame), then the ball's x y z: 9x9.
     pub covariance: DMatrix<f64>,
     /// Sigma of a profile point, mm.
     pub point_sigma: f64,
-    /// Sigma of the robot's position as the ball sees it, per axis, mm.
+    /// Sigma of the robot's position, estimated from the ball, per axis, mm.
     pub robot_sigma: f64,
-    /// On which side of the profile plane the ball's centre lies, in most profiles.
+    /// Side of the profile plane on which the ball's centre lies in most profiles.
     pub side: Side,
-    /// By how much the other side fits worse (squared Mahalanobis distance); infinite where it has no solution.
+    /// Excess misfit of the solution on the other side (squared Mahalanobis distance); infinite without such a solution.
     pub side_margin: f64,
-    /// One a profile, in the order given.
+    /// One entry per profile, in the order given.
     pub profiles: Vec<ProfileResidual>,
     /// Squared Mahalanobis distances over their degrees of freedom; near 1.
     pub chi2: f64,
@@ -61,14 +61,14 @@ struct State {
     ball: Vec3,
 }
 
-/// The ball's centre in the sensor frame.
+/// The ball's centre in the sensor frame, mm.
 fn in_sensor(s: &State, pose: &Rigid<Base, Flange>) -> Vec3 {
     s.x.inverse().point(&pose.inverse().point(&s.ball))
 }
 
-/// Expected circle, and its derivatives by the ball's place in the sensor frame.
+/// The expected circle and its derivatives by the ball's position in the sensor frame.
 fn expected(q: &Vec3, radius: f64) -> (Vec3, Mat3) {
-    // Beyond the ball's radius there is no circle; a small one keeps the derivative finite.
+    // Beyond the ball's radius there is no circle; a small radius keeps the derivative finite.
     let r = (radius * radius - q.y * q.y).max((0.02 * radius).powi(2)).sqrt();
     (Vec3::new(q.x, q.z, r), Mat3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -q.y / r, 0.0))
 }
@@ -79,12 +79,13 @@ struct Item<'a> {
     pose: &'a Rigid<Base, Flange>,
 }
 
-/// Residual and derivatives by the nine unknowns.
+/// Residual and its derivatives by the nine unknowns; last, the derivatives by the ball's position in the sensor
+/// frame.
 fn row(s: &State, item: &Item<'_>, radius: f64) -> (Vec3, SMatrix<f64, 3, 9>, Mat3) {
     let q = in_sensor(s, item.pose);
     let (c, by_q) = expected(&q, radius);
     let (rx, rb) = (s.x.rotation.transpose(), item.pose.rotation.transpose());
-    // q = R_Xᵀ(R_Bᵀ(p − t_B) − t_X); a left turn r of R_X turns what is in brackets by −r.
+    // q = R_Xᵀ(R_Bᵀ(p − t_B) − t_X); a left rotation r of R_X rotates the bracket by −r.
     let mut by = SMatrix::<f64, 3, 9>::zeros();
     by.fixed_view_mut::<3, 3>(0, 0).copy_from(&-rx);
     by.fixed_view_mut::<3, 3>(0, 3).copy_from(&(rx * skew(&(s.x.rotation * q))));
@@ -128,7 +129,7 @@ fn covariance_of(s: &State, item: &Item<'_>, radius: f64, n: &Noise) -> Mat3 {
     own + by_q * by_q.transpose() * (n.robot * n.robot)
 }
 
-/// A minimum, its covariance, and the squared Mahalanobis distances there in all.
+/// A minimum, its covariance, and the sum of the squared Mahalanobis distances there.
 struct Solved {
     state: State,
     covariance: DMatrix<f64>,
@@ -147,7 +148,7 @@ fn fit(items: &[Item<'_>], start: &State, radius: f64, n: &Noise, loss: Loss) ->
     Some(Solved { state: s.state, covariance: s.covariance?, cost, end })
 }
 
-/// One step of the robot's variance component.
+/// One step of the estimate of the robot's variance component.
 fn robot_sigma(items: &[Item<'_>], s: &State, radius: f64, n: &Noise) -> Option<f64> {
     let m = 3 * items.len();
     let mut model = Components {
@@ -167,8 +168,8 @@ fn robot_sigma(items: &[Item<'_>], s: &State, radius: f64, n: &Noise) -> Option<
     Some(model.step(&[n.robot * n.robot], &[1e-8])?[0].sqrt())
 }
 
-/// Starts for one side: the sensor's x and z axes, its place and the ball, linear in the circles'
-/// centres; the y axis follows from the right hand.
+/// Start values for one side: the sensor's x and z axes, its position and the ball, linear in the circles' centres.
+/// The y axis completes the right-handed frame.
 fn starts(items: &[Item<'_>], radius: f64, side: Side) -> Vec<State> {
     let sign = if side == Side::Plus { 1.0 } else { -1.0 };
     let height = |c: &Circle| sign * (radius * radius - c.value.z * c.value.z).max(0.0).sqrt();
@@ -201,7 +202,7 @@ fn starts(items: &[Item<'_>], radius: f64, side: Side) -> Vec<State> {
     out
 }
 
-/// Majority side of the ball over the profiles.
+/// Side of the ball in the majority of the profiles.
 fn side_of(items: &[Item<'_>], s: &State) -> Side {
     let plus = items.iter().filter(|i| in_sensor(s, i.pose).y > 0.0).count();
     if 2 * plus >= items.len() { Side::Plus } else { Side::Minus }
@@ -237,8 +238,8 @@ impl Data<'_> {
         used.map(|i| self.items[i]).collect()
     }
 
-    /// The robust fit with the ball on one side that costs least. A start of one side may end on the other where the
-    /// ball is seen from both: all are tried for each.
+    /// The robust fit of lowest cost with the ball on one side. If the ball is seen from both sides, a start on one
+    /// side may end on the other, so the starts of both sides are tried.
     fn best_start(&self, side: Side, point: f64) -> Option<Solved> {
         let rough = Noise { point, robot: 0.5 };
         [Side::Plus, Side::Minus]
@@ -249,7 +250,7 @@ impl Data<'_> {
             .min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
-    /// The solution with the ball on one side, profiles beyond the gate left out.
+    /// The solution with the ball on one side, without the profiles beyond the gate.
     fn on_side(&self, side: Side, point: f64) -> Option<Solution> {
         let all: Vec<usize> = (0..self.items.len()).collect();
         let noise = Noise { point, robot: 0.1 };
@@ -260,7 +261,7 @@ impl Data<'_> {
             if next == s.used || next.len() < self.o.min_profiles {
                 break;
             }
-            // One at a time: a wrong profile spoils the others' distances.
+            // Exclude one profile per round: a wrong profile also raises the distances of the others.
             let worst = s.worst(self)?;
             if s.distance2(self, worst, true) > self.o.gate {
                 s.used.retain(|&i| i != worst);
@@ -271,7 +272,7 @@ impl Data<'_> {
         Some(Solution { side: side_of(&self.items, &s.solved.state), ..s })
     }
 
-    /// Squared Mahalanobis distances of all profiles, none counted beyond the gate.
+    /// Sum of the squared Mahalanobis distances of all profiles, each limited to the gate.
     fn misfit(&self, s: &Solved, n: &Noise) -> f64 {
         let one = |i: &Item<'_>| {
             let (r, _, _) = row(&s.state, i, self.radius);
@@ -283,7 +284,7 @@ impl Data<'_> {
 }
 
 impl Solution {
-    /// Least squares over the used profiles, in turn with the robot's variance component.
+    /// Least squares over the used profiles, alternating with the robot's variance component.
     fn refit(&mut self, data: &Data<'_>) -> Option<()> {
         let chosen = data.chosen(self.used.iter().copied());
         for _ in 0..8 {
@@ -308,8 +309,8 @@ impl Solution {
         self.used.iter().copied().max_by(|&a, &b| d(a).total_cmp(&d(b)))
     }
 
-    /// Refuses a pose that is known to a fifth of the ball's radius or worse; turns count at a reach of 50 mm or the
-    /// radius.
+    /// Refuses a pose with a sigma of a fifth of the ball's radius or more. Rotations count at a lever arm of 50 mm
+    /// or the radius, whichever is larger.
     fn determined(&self, radius: f64) -> Result<()> {
         let c = &self.solved.covariance;
         let largest_sigma =
@@ -320,7 +321,7 @@ impl Solution {
         Ok(())
     }
 
-    /// How a profile fits, and how the others predict it.
+    /// Residuals of one profile in the fit, and in the fit to the others.
     fn residual(&self, data: &Data<'_>, i: usize, name: &str) -> ProfileResidual {
         let (item, state) = (&data.items[i], &self.solved.state);
         let rest = data.chosen(self.used.iter().copied().filter(|&k| k != i));
@@ -379,7 +380,7 @@ fn enough(profiles: &[Profile], poses: &[Rigid<Base, Flange>], o: &BallOptions) 
     Ok(())
 }
 
-/// One a profile; none may be larger than the ball.
+/// One circle per profile; none may be larger than the ball.
 fn circles_of(profiles: &[Profile], radius: f64, o: &BallOptions) -> Result<Vec<Circle>> {
     let circles = profiles.iter().map(|p| circle(p, radius, o)).collect::<Result<Vec<_>>>()?;
     let largest = circles.iter().map(|c| c.value.z).fold(0.0, f64::max);
@@ -393,17 +394,17 @@ fn circles_of(profiles: &[Profile], radius: f64, o: &BallOptions) -> Result<Vec<
     Ok(circles)
 }
 
-/// Sigma of a profile point about its circle, all profiles together, mm.
+/// Sigma of a profile point about its circle, pooled over all profiles, mm.
 fn point_sigma(circles: &[Circle]) -> f64 {
     let freedom: f64 = circles.iter().map(|c| c.points[0] as f64 - 3.0).sum();
     (circles.iter().map(|c| c.squares).sum::<f64>() / freedom.max(1.0)).sqrt().max(1e-5)
 }
 
-/// The solution on the stated side, or on the one that fits clearly better; and by how much the other fits worse.
+/// The solution on the stated side, or on the side that fits clearly better, and the excess misfit of the other side.
 fn told_side(data: &Data<'_>, mut sides: Vec<Solution>) -> Result<(Solution, f64)> {
-    // Both sides are judged with the noise of the better one.
+    // Both sides are judged with the noise of the solution with less robot noise.
     sides.sort_by(|a, b| a.noise.robot.total_cmp(&b.noise.robot));
-    // A ball that is seen as often from one side as from the other: both ways may end in one place.
+    // If the ball is seen equally often from both sides, both solutions may end on the same side.
     sides.dedup_by_key(|s| s.side);
     let margin = match sides.as_slice() {
         [] => return Err(undetermined()),
@@ -432,7 +433,8 @@ fn told_side(data: &Data<'_>, mut sides: Vec<Solution>) -> Result<(Solution, f64
     Ok((found, margin))
 }
 
-/// Squared Mahalanobis distance; a used profile has drawn the fit towards itself, another has not.
+/// Squared Mahalanobis distance. The covariance of the fit is subtracted for a used profile, because it pulled the
+/// fit towards itself, and added for any other.
 fn distance2(s: &Solved, item: &Item<'_>, radius: f64, n: &Noise, used: bool) -> f64 {
     let (r, j, _) = row(&s.state, item, radius);
     let own = covariance_of(&s.state, item, radius, n);

@@ -1,5 +1,5 @@
-//! In: what is known so far, poses that could be next. Out: what each would add, and the one after which the error of
-//! a scanned point is expected to be least.
+//! In: the current belief about the unknowns, candidate poses. Out: the information that each candidate would add,
+//! and the candidate with the smallest expected error of a scanned point.
 //! Frame and unit: see `unknowns`; mm, rad, px (docs/math.md, Joint calibration (9), (10)).
 
 use super::options::{JointOptions, Noise};
@@ -18,29 +18,29 @@ use crate::recording::BoardSpec;
 use nalgebra::{DMatrix, Matrix2};
 use rand::{Rng, SeedableRng};
 
-/// What is known so far.
+/// The current belief about the shared unknowns.
 pub struct Belief {
-    /// The stops' boards are not needed here.
+    /// The current state; its stops' boards are not used here.
     pub state: State,
-    /// Of the shared unknowns, as far as any stop has spoken of them.
+    /// Information matrix of the shared unknowns; zero for those that no stop has measured.
     pub information: DMatrix<f64>,
-    /// What each source scatters by.
+    /// Noise of each source.
     pub noise: Noise,
     /// Mean JᵀJ of the points in the working volume ([`weights`]).
     pub weights: DMatrix<f64>,
     layout: Layout,
     mount: Mount,
-    /// Typical stated sigmas of a corner, of a thinned peak and of a spot, px.
+    /// Typical stated sigmas of a corner, of an averaged peak and of a spot, px.
     sigmas_px: [f64; 3],
 }
 
-/// Indices of the unknowns that something has spoken of.
+/// Indices of the unknowns with any information.
 fn known(m: &DMatrix<f64>) -> Vec<usize> {
     (0..m.nrows()).filter(|&i| m[(i, i)] > 0.0).collect()
 }
 
-/// The inverse over the unknowns that are known; zero for the others. Units differ by orders: the diagonal is scaled
-/// to one.
+/// The inverse over the unknowns with information; zero for the others. The diagonal is scaled to one, because the
+/// units differ by orders of magnitude.
 fn inverse(m: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let at = known(m);
     let scale: Vec<f64> = at.iter().map(|&i| m[(i, i)].sqrt()).collect();
@@ -62,7 +62,7 @@ fn middle(values: impl Iterator<Item = f64>, otherwise: f64) -> f64 {
 }
 
 impl Belief {
-    /// After a solve; `places` are pixels of the working volume ([`super::volume::places`]). `None` where the
+    /// The belief after a solve. `places`: pixels of the working volume ([`super::volume::places`]). `None` if the
     /// covariance has no inverse.
     pub fn after(fit: &JointFit, places: &[Vec2], o: &JointOptions) -> Option<Belief> {
         let corners = fit.shots.iter().flat_map(|s| s.seen.sigmas_px.iter().copied());
@@ -79,18 +79,18 @@ impl Belief {
         })
     }
 
-    /// Expected error of a scanned point, mm rms.
+    /// Expected error of a scanned point, rms, mm.
     pub fn expected_mm(&self) -> f64 {
         inverse(&self.information).map_or(f64::INFINITY, |c| expected(&self.weights, &c))
     }
 
-    /// The same with a stop added.
+    /// The same with a stop added that contributes the information `gain`.
     pub fn expected_with(&self, gain: &DMatrix<f64>) -> f64 {
         inverse(&(&self.information + gain)).map_or(f64::INFINITY, |c| expected(&self.weights, &c))
     }
 
-    /// What a stop would show: the board's features, the stripe and the spot where they fall on the board. `None`
-    /// where a feature is not in the picture.
+    /// The predicted measurements of a stop: the board's features, and the stripe and the spot if they fall on the
+    /// board. `None` if a feature lies outside the picture.
     pub fn predicted(&self, spec: &BoardSpec, board: &Rigid<Camera, Board>, place: usize) -> Option<Shot> {
         let points = spec.features();
         let camera = &self.state.camera;
@@ -123,7 +123,7 @@ impl Belief {
         Some(Spot { pixel, covariance: Matrix2::identity() * self.sigmas_px[2].powi(2) })
     }
 
-    /// Information that a stop adds about the shared unknowns, its own board's pose eliminated.
+    /// Information that a stop adds about the shared unknowns, with its own board's pose eliminated.
     pub fn gain(&self, shot: &Shot, board: &Rigid<Camera, Board>) -> Option<DMatrix<f64>> {
         let state = State { boards: vec![*board], ..self.state.clone() };
         let mut terms = Terms {
@@ -152,13 +152,14 @@ impl Belief {
     }
 }
 
-/// A camera point's pixel, where it is in the picture and at least `margin` px from its edge.
+/// Pixel of a camera-frame point if it is in the picture and at least `margin` px from its edge.
 pub fn in_picture(camera: &Intrinsics, p: &Vec3, margin: f64) -> Option<Vec2> {
     let (w, h) = (f64::from(camera.width) - 1.0 - margin, f64::from(camera.height) - 1.0 - margin);
     camera.pixel_from_point(p).filter(|q| q.x >= margin && q.y >= margin && q.x <= w && q.y <= h)
 }
 
-/// The ends of the stripe on a board as far as it is in the picture, camera frame, mm; `None` where none is.
+/// Ends of the part of the stripe that is on the board and in the picture, camera frame, mm; `None` without such a
+/// part.
 pub fn stripe_on(s: &State, spec: &BoardSpec, board: &Rigid<Camera, Board>) -> Option<[Vec3; 2]> {
     let normal: Vec3 = board.rotation.column(2).into();
     let along = s.plane.normal.cross(&normal).try_normalize(1e-9)?;
@@ -178,25 +179,25 @@ pub fn stripe_on(s: &State, spec: &BoardSpec, board: &Rigid<Camera, Board>) -> O
     ((last - first).norm() > 0.1 * half).then_some([first, last])
 }
 
-/// Which boards before the camera are looked at as the next stop.
+/// Limits of the board poses, relative to the camera, that are considered for the next stop.
 #[derive(Clone, Copy, Debug)]
 pub struct Looks {
-    /// Depths of the board's middle, mm.
+    /// Range of depths of the board's middle, mm.
     pub depths: [f64; 2],
-    /// Largest tilt of the board against the picture, degrees.
+    /// Largest tilt of the board relative to the image plane, degrees.
     pub tilt_deg: f64,
-    /// Largest turn about the optical axis, degrees; away from `upright`.
+    /// Largest rotation about the optical axis, relative to `upright`, degrees.
     pub turn_deg: f64,
-    /// Least distance of a feature from the picture's edge, px.
+    /// Smallest distance of a feature from the picture's edge, px.
     pub margin_px: f64,
-    /// The board's turn about the optical axis that a turn of 0 is, rad.
+    /// Rotation of the board about the optical axis that counts as zero, rad.
     pub upright: f64,
-    /// Some of the stripe has to be in view; not asked for while nobody knows where the sheet is.
+    /// Whether part of the stripe has to be in view; false while the laser plane is unknown.
     pub lit: bool,
 }
 
-/// Boards before the camera, the whole board and, where it is asked for, some of the stripe in view; at most `count`,
-/// the same for the same seed.
+/// Random board poses in the camera frame with the entire board and, if required, part of the stripe in view. At most
+/// `count`; the same seed gives the same poses.
 pub fn candidates(s: &State, spec: &BoardSpec, looks: &Looks, count: usize, seed: u64) -> Vec<Rigid<Camera, Board>> {
     let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
     let features = spec.features();
@@ -217,17 +218,17 @@ pub fn candidates(s: &State, spec: &BoardSpec, looks: &Looks, count: usize, seed
     (0..60 * count).filter_map(|_| one(&mut rng)).take(count).collect()
 }
 
-/// The next stop.
+/// The chosen next stop.
 #[derive(Clone, Debug)]
 pub struct Choice {
-    /// Index among the candidates.
+    /// Index of the candidate.
     pub index: usize,
-    /// Expected error of a scanned point with it, mm rms.
+    /// Expected error of a scanned point with this stop added, rms, mm.
     pub expected_mm: f64,
 }
 
-/// The candidate after which the error of a scanned point in the working volume is expected to be least; of equal
-/// ones the first. Candidates that cannot be seen whole are passed over.
+/// The candidate with the smallest expected error of a scanned point in the working volume; the first one of equal
+/// candidates. Candidates that are not completely visible are skipped.
 pub fn next(belief: &Belief, spec: &BoardSpec, candidates: &[Rigid<Camera, Board>], place: usize) -> Option<Choice> {
     let value = |board: &Rigid<Camera, Board>| {
         let shot = belief.predicted(spec, board, place)?;

@@ -1,5 +1,5 @@
-//! In: a joint solve. Out: which source limits a scanned point's error, and whether the robot's poses disagree by
-//! noise or by something that follows where the arm stands (link lengths, joint zeros).
+//! In: a joint solve. Out: the source that limits a scanned point's error, and whether the misfits of the robot's
+//! poses are noise or follow the arm's configuration (link lengths, joint zeros).
 //! Frame and unit: mm, degrees (docs/math.md, Joint calibration (11)).
 
 use super::options::JointOptions;
@@ -11,7 +11,8 @@ use crate::geometry::{Base, Flange, Rigid};
 use nalgebra::{DMatrix, DVector};
 use rand::{SeedableRng, seq::SliceRandom};
 
-/// What each part adds to the error of a scanned point, mm rms; the squares add up to the whole.
+/// Contribution of each source to the error of a scanned point, rms, mm, the largest first; the squares add up to the
+/// total.
 pub fn by_part(fit: &JointFit, weights: &DMatrix<f64>) -> Vec<(Part, f64)> {
     let mut all: Vec<(Part, f64)> =
         Part::ALL.into_iter().zip(&fit.shares).map(|(p, share)| (p, expected(weights, share))).collect();
@@ -19,32 +20,33 @@ pub fn by_part(fit: &JointFit, weights: &DMatrix<f64>) -> Vec<(Part, f64)> {
     all
 }
 
-/// How well the arm's misfits at some poses predict those at poses that were left out.
+/// How well the arm's misfits at some poses predict those at excluded poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Systematic {
-    /// Share of the squared misfit at a pose left out that the others predict; 0 and less for noise.
+    /// Share of the squared misfit at an excluded pose that the others predict; zero or negative for noise.
     pub predicted: f64,
-    /// The largest such share among random deals of the same misfits.
+    /// The largest such share among random permutations of the same misfits.
     pub by_chance: f64,
 }
 
 impl Systematic {
-    /// Whether the arm errs in a way that follows its pose. What the fit has taken of noise makes it less predictable
-    /// than dealt misfits, never more.
+    /// Whether the arm's errors follow its pose. The part of the noise that the fit absorbed makes the misfits less
+    /// predictable than permuted ones, never more.
     pub fn found(&self) -> bool {
         self.predicted > self.by_chance
     }
 }
 
-/// Fewest poses that are asked.
+/// Smallest number of poses for this test.
 const FEWEST: usize = 15;
-/// Deals; more than the largest of 40 is met by chance once in 41 times.
+/// Number of permutations; noise exceeds the largest of 40 by chance once in 41 times.
 const DEALS: u64 = 40;
-/// Of the smooth function's coefficients against the misfits: what follows the pose is as large as what does not.
+/// Ridge weight of the smooth function's coefficients against the misfits: the part that follows the pose is assumed
+/// to be as large as the part that does not.
 const RIDGE: f64 = 1.0;
 
-/// Leaves each pose out in turn and predicts its misfit from the others, by a function that is linear in the flange's
-/// place and in the elements of its turn. `None` with too few poses to tell.
+/// Excludes each pose in turn and predicts its misfit from the others, by a function that is linear in the flange's
+/// position and in the elements of its rotation. `None` with too few poses.
 pub fn systematic(fit: &JointFit, o: &JointOptions) -> Option<Systematic> {
     let placed: Vec<(Rigid<Base, Flange>, [f64; 6])> = fit
         .shots
@@ -81,14 +83,14 @@ pub fn systematic(fit: &JointFit, o: &JointOptions) -> Option<Systematic> {
     Some(Systematic { predicted, by_chance: by_chance.fold(f64::NEG_INFINITY, f64::max) })
 }
 
-/// The matrix that predicts each value from all others: of the ridge smoother S, (S - diag S) over 1 - diag S.
+/// The matrix that predicts each value from all others: (S - diag S) over 1 - diag S for the ridge smoother S.
 fn prediction(poses: &[Rigid<Base, Flange>]) -> Option<DMatrix<f64>> {
     let n = poses.len();
     let raw = DMatrix::from_fn(n, 12, |i, k| match k {
         0..3 => poses[i].translation[k],
         _ => poses[i].rotation[k - 3],
     });
-    // Each column about its mean, in units of its own scatter.
+    // Each column is centred at its mean and divided by its own standard deviation.
     let mut x = raw.clone();
     for mut column in x.column_iter_mut() {
         let mean = column.sum() / n as f64;

@@ -1,5 +1,5 @@
-//! In: stops in the order in which they were made, a solve in which the robot scatters more than arms do. Out: after
-//! which stop the board was moved, and how far.
+//! In: stops in the order in which they were made, and a solve with more robot noise than arms have. Out: the stop at
+//! which the board was moved, and the distance.
 //! Frame and unit: mm (docs/math.md, Joint calibration (13)).
 
 use super::options::JointOptions;
@@ -7,24 +7,24 @@ use super::shots::Shot;
 use super::solve::{JointFit, solve};
 use crate::geometry::Vec3;
 
-/// No arm that calibrates anything scatters more than this per axis, mm.
+/// Largest plausible scatter of a robot arm per axis, mm.
 const SUSPICIOUS_MM: f64 = 0.2;
-/// Stops on either side of the move, so that both places are determined.
+/// Smallest number of stops before and after the move, so that both poses of the board are determined.
 const EITHER_SIDE: usize = 3;
-/// Two places must explain the robot's scatter to this share.
+/// With two poses of the board, the robot's scatter must fall at least to this share.
 const EXPLAINED: f64 = 1.0 / 3.0;
 
-/// When a board was moved.
+/// A move of the board.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moved {
-    /// The first picture that shows it at its new place.
+    /// The first picture that shows the board at its new pose.
     pub name: String,
-    /// Distance of its middle from where it was, mm.
+    /// Distance between the old and the new position of the board's middle, mm.
     pub mm: f64,
 }
 
-/// Looks for one move of the one board that all stops show. `None` where the robot scatters as arms do, or where no
-/// move explains it.
+/// Searches for a single move of the one board that all stops show. `None` if the robot's scatter is plausible, or if
+/// no move explains it.
 pub fn moved(shots: &[Shot], fit: &JointFit, o: &JointOptions) -> Option<Moved> {
     if fit.noise.robot_mm < SUSPICIOUS_MM || fit.state.far_from_board.len() != 1 {
         return None;

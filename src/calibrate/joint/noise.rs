@@ -1,5 +1,5 @@
-//! In: a solve's residuals with their derivatives and its covariance. Out: what each source scatters by, how many
-//! degrees of freedom tell it, and which stops stand out.
+//! In: the residuals of a solve with their derivatives and its covariance. Out: the noise of each source, the degrees
+//! of freedom that determine it, and the stops that stand out.
 //! Frame and unit: mm, rad; factors of stated sigmas (docs/math.md, Joint calibration (6), (7)).
 
 use super::options::Noise;
@@ -8,31 +8,31 @@ use super::terms::{Term, Terms};
 use super::unknowns::State;
 use nalgebra::DMatrix;
 
-/// Below these a source no longer matters beside any other; mm and rad for the robot.
+/// Lower limits, below which a source is negligible beside any other; mm and rad for the robot.
 const FLOOR: [f64; 5] = [1e-3, 1e-3, 1e-3, 1e-4, 1e-6];
 
-/// Squared residuals of a part and the degrees of freedom that they have left.
+/// Squared residuals of a part and their remaining degrees of freedom.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Left {
     /// Sum of squared residuals, in sigmas, robustly weighted.
     pub squares: f64,
-    /// Residuals minus what the fit has taken of them.
+    /// Number of residuals minus the degrees of freedom that the fit absorbed.
     pub freedom: f64,
-    /// Residuals.
+    /// Number of residuals.
     pub count: f64,
 }
 
-/// What a solve leaves, by part and by stop.
+/// The residuals of a solve, by part and by stop.
 pub struct Leavings {
     /// In the order of [`Part::ALL`].
     pub parts: [Left; 5],
     /// By stop, then by part.
     pub shots: Vec<[Left; 5]>,
-    /// How each part's noise moves the shared unknowns: the covariance is the sum of these.
+    /// Contribution of each part's noise to the covariance of the shared unknowns; their sum is that covariance.
     pub shares: Vec<DMatrix<f64>>,
 }
 
-/// Redundancies \[foerstner79\] at a solution: of a residual r with derivatives J, 1 - J C Jᵀ is left.
+/// Redundancies \[foerstner79\] at a solution: a residual r with derivatives J keeps 1 - J C Jᵀ degrees of freedom.
 pub fn leavings(terms: &Terms<'_>, s: &State, covariance: &DMatrix<f64>, huber: f64) -> Option<Leavings> {
     let shared = terms.layout.shared();
     let mut out = Leavings {
@@ -75,20 +75,20 @@ pub fn leavings(terms: &Terms<'_>, s: &State, covariance: &DMatrix<f64>, huber: 
 }
 
 impl Leavings {
-    /// The noise that these residuals show: each part's scatter over its redundancy. A part with less than one degree
-    /// of freedom left keeps what was assumed.
+    /// The noise that these residuals show: each part's squared residuals over their redundancy. A part with less
+    /// than one remaining degree of freedom keeps its assumed noise.
     pub fn noise(&self, now: &Noise) -> Noise {
         let mut f = now.factors();
         for (k, left) in self.parts.iter().enumerate() {
             if left.freedom >= 1.0 {
-                // Sources that share their redundancy trade it slowly: at most a factor of 10 a round.
+                // Sources that share redundancy exchange it slowly, so a round changes a factor by 10 at most.
                 f[k] = (f[k] * (left.squares / left.freedom).sqrt().clamp(0.1, 10.0)).max(FLOOR[k]);
             }
         }
         Noise::of(f)
     }
 
-    /// A stop's squared residuals of a part over its own degrees of freedom: 1 is usual.
+    /// A stop's squared residuals of some parts over their degrees of freedom: 1 is usual.
     pub fn stands_out(&self, shot: usize, parts: &[Part]) -> f64 {
         let of = |f: fn(&Left) -> f64| parts.iter().map(|p| f(&self.shots[shot][*p as usize])).sum::<f64>();
         let (squares, freedom, count) = (of(|l| l.squares), of(|l| l.freedom), of(|l| l.count));

@@ -1,44 +1,45 @@
-//! In: what a person may choose about a joint solve. Out: the choice, checked; the noise that is assumed.
-//! Frame and unit: mm, degrees where the name says so.
+//! In: a user's settings for the joint solve. Out: the checked settings, and the assumed noise.
+//! Frame and unit: mm; degrees where the name states them.
 
 use crate::calibrate::hand_eye::options::Mount;
 use crate::camera::{ALWAYS_NAMED, CameraCovariance, Parameters};
 use crate::fault::{Fault, Result};
 
-/// What each source scatters by.
+/// Noise of each source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
-    /// Times a corner's stated sigma is its true one.
+    /// Factor from a corner's stated sigma to its true one.
     pub feature: f64,
-    /// Times a peak's stated sigma is its true one, speckle that neighbours share included.
+    /// Factor from a peak's stated sigma to its true one; includes the speckle that neighbours share.
     pub stripe: f64,
-    /// Times a spot's stated sigma is its true one.
+    /// Factor from a spot's stated sigma to its true one.
     pub spot: f64,
-    /// The robot's position, per axis, mm.
+    /// Sigma of the robot's position, per axis, mm.
     pub robot_mm: f64,
-    /// The robot's orientation, per axis, rad.
+    /// Sigma of the robot's orientation, per axis, rad.
     pub robot_rad: f64,
 }
 
 impl Noise {
-    /// Before any residual is known: sigmas as they are stated, a robot of its data sheet's repeatability.
+    /// Start values before residuals are known: the stated sigmas, and a robot with the repeatability of its data
+    /// sheet.
     pub fn usual() -> Noise {
         Noise { feature: 1.0, stripe: 1.0, spot: 1.0, robot_mm: 0.05, robot_rad: 2e-4 }
     }
-    /// One a part, in the order of [`super::shots::Part::ALL`].
+    /// One value per part, in the order of [`super::shots::Part::ALL`].
     pub fn factors(&self) -> [f64; 5] {
         [self.feature, self.stripe, self.spot, self.robot_mm, self.robot_rad]
     }
-    /// From the same.
+    /// The inverse of [`Noise::factors`].
     pub(super) fn of(f: [f64; 5]) -> Noise {
         Noise { feature: f[0], stripe: f[1], spot: f[2], robot_mm: f[3], robot_rad: f[4] }
     }
 }
 
-/// What another calibration says of the camera, from pictures that are not among those solved here.
+/// The result of another calibration of the camera, from pictures that are not part of this solve.
 #[derive(Clone, Debug)]
 pub struct CameraPrior {
-    /// Its values, in the order of [`crate::camera::NAMES`].
+    /// The camera's parameters, in the order of [`crate::camera::NAMES`].
     pub mean: Parameters,
     /// Their covariance.
     pub covariance: CameraCovariance,
@@ -47,16 +48,16 @@ pub struct CameraPrior {
 /// Settings of [`super::solve::solve`].
 #[derive(Clone, Debug)]
 pub struct JointOptions {
-    /// Who carries the camera.
+    /// What carries the camera.
     pub mount: Mount,
     /// The camera's free parameters, indices into [`crate::camera::NAMES`]; the others keep their values.
     pub camera_free: Vec<usize>,
-    /// Of a camera that was calibrated from other pictures.
+    /// Prior for a camera that was calibrated from other pictures.
     pub camera_prior: Option<CameraPrior>,
-    /// A part of a stop is left out where its squared residual, in sigmas and over its degrees of freedom, stands
-    /// this far out; 4..=1000. Of six numbers one good stop in a million exceeds 6.5, of two 14.
+    /// A part of a stop is excluded if its squared residuals over their degrees of freedom exceed this multiple of
+    /// the usual value; 4..=1000. One good stop in a million exceeds 6.5 for six numbers, and 14 for two.
     pub gate: f64,
-    /// Length of a corner's or a peak's residual, in sigmas, from which it pulls no harder; 1.5..=20.
+    /// Length of a corner's or a peak's residual, in sigmas, beyond which its pull no longer grows; 1.5..=20.
     pub huber: f64,
 }
 
@@ -73,7 +74,7 @@ impl Default for JointOptions {
 }
 
 impl JointOptions {
-    /// Refuses values out of the ranges that the fields state.
+    /// Refuses values outside the ranges stated at the fields.
     pub fn check(&self) -> Result<()> {
         let ranges = [("gate", self.gate, 4.0, 1000.0), ("huber", self.huber, 1.5, 20.0)];
         match ranges.iter().find(|(_, v, low, high)| !(low..=high).contains(&v)) {

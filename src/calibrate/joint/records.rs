@@ -1,4 +1,4 @@
-//! In: a joint solve. Out: the covariances of its records, that of all of them together, and the verdict.
+//! In: a joint solve. Out: the covariance of each of its records, their joint covariance, and the verdict.
 //! Frame and unit: as in calibration files: mm, rad, px.
 
 use super::limits::{Systematic, by_part};
@@ -17,7 +17,7 @@ use crate::rig::{Covariance, JointCovariance, Kind, Quality, Verdict};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
-/// How the numbers of one record follow the shared unknowns: names and derivatives.
+/// Names of one record's parameters, and their derivatives by the shared unknowns.
 struct Follows {
     kind: Kind,
     names: Vec<&'static str>,
@@ -36,7 +36,7 @@ fn part(kind: Kind, names: &[&'static str], l: &Layout, at: usize, basis: &DMatr
     Follows { kind, names: names.to_vec(), by }
 }
 
-/// The records that the data speaks of, the hand-eye as this kind.
+/// The records that the data determines; the hand-eye record has the kind `hand_eye`.
 fn follows(fit: &JointFit, hand_eye: Kind) -> Vec<Follows> {
     let l = &fit.layout;
     let mut all = vec![camera(l)];
@@ -52,7 +52,7 @@ fn follows(fit: &JointFit, hand_eye: Kind) -> Vec<Follows> {
     all
 }
 
-/// The covariance of each record. A pointer's holds the camera's too, as its file does.
+/// The covariance of each record. The pointer's includes the camera's parameters, as in its file.
 pub fn covariances(fit: &JointFit, hand_eye: Kind) -> BTreeMap<Kind, Covariance> {
     let all = follows(fit, hand_eye);
     let of = |f: &Follows| {
@@ -75,7 +75,7 @@ fn symmetric(m: DMatrix<f64>) -> DMatrix<f64> {
     (&m + m.transpose()) * 0.5
 }
 
-/// All records' covariance in one; `of` names what each holds.
+/// The joint covariance of all records; `of` states the contents of each.
 pub fn together(fit: &JointFit, hand_eye: Kind, of: BTreeMap<Kind, String>) -> JointCovariance {
     let all = follows(fit, hand_eye);
     let rows: usize = all.iter().map(|f| f.names.len()).sum();
@@ -91,7 +91,8 @@ pub fn together(fit: &JointFit, hand_eye: Kind, of: BTreeMap<Kind, String>) -> J
     JointCovariance { format: 1, of, parameters, matrix }
 }
 
-/// The covariance of the shared unknowns as separate calibrations state it: each for itself, nothing between them.
+/// The covariance of the shared unknowns as separate calibrations state it: block by block, without correlations
+/// between the blocks.
 pub fn separately(
     l: &Layout,
     camera: &CameraCovariance,
@@ -108,26 +109,26 @@ pub fn separately(
         out.view_mut((l.hand_eye(), l.hand_eye()), (6, 6)).copy_from(&c.view((0, 0), (6, 6)));
     }
     if let Some((plane, c)) = plane {
-        // The basis' columns are orthonormal.
+        // The columns of the basis are orthonormal.
         let basis = plane_basis(plane);
         out.view_mut((l.plane(), l.plane()), (3, 3)).copy_from(&(basis.transpose() * c * basis));
     }
     out
 }
 
-/// Fewest numbers beyond what they determine by which a scatter is told: to three tenths of itself.
+/// Smallest redundancy that determines a scatter: 6 give it to about 30 %.
 const LEAST_NUMBERS: i64 = 6;
 
-/// What is to be said beside the fit itself.
+/// Additional information for the report besides the fit.
 pub struct Beside {
-    /// Expected error of a scanned point by separate calibrations of the same pictures, mm rms; and how far their
-    /// points lie from the joint ones, mm rms.
+    /// Expected error of a scanned point by separate calibrations of the same pictures, rms, mm; and distance of
+    /// their points from the joint ones, rms, mm.
     pub separate: Option<[f64; 2]>,
-    /// Whether the arm's misfits follow its pose.
+    /// The test whether the arm's misfits follow its pose.
     pub systematic: Option<Systematic>,
-    /// Depths between which boards were lit, mm.
+    /// Smallest and largest depth of a laser-lit position on a board, mm.
     pub lit: [f64; 2],
-    /// What was left out before the solve.
+    /// What was excluded before the solve.
     pub missing: Vec<(String, String)>,
 }
 
@@ -175,12 +176,12 @@ pub fn judge(fit: &JointFit, weights: &DMatrix<f64>, beside: &Beside, limits: &L
     Quality { verdict: j.verdict, reasons: j.reasons, advice: j.advice, figures, per_picture: Vec::new() }
 }
 
-/// What a robot's pose scatters by on each axis, mm and degrees.
+/// Scatter of the robot's pose per axis, mm and degrees.
 fn robot_scatter(fit: &JointFit) -> [f64; 2] {
     [fit.noise.robot_mm, fit.noise.robot_rad.to_degrees()]
 }
 
-/// An arm whose misfits follow its pose limits what any solve can give.
+/// An arm whose misfits follow its pose limits the accuracy of any solve.
 fn by_arm(systematic: Option<&Systematic>, j: &mut Judgement) {
     if let Some(s) = systematic.filter(|s| s.found()) {
         j.at_best(Verdict::Usable, true, || {
@@ -200,15 +201,15 @@ fn by_arm(systematic: Option<&Systematic>, j: &mut Judgement) {
     }
 }
 
-/// Whether the stops tell the robot's scatter.
+/// Checks that the stops determine the robot's scatter.
 fn by_stops(fit: &JointFit, j: &mut Judgement) {
-    // Each stop brings three numbers of the arm's place, hand-eye and boards take six of them.
+    // Each stop contributes three numbers of the arm's position; hand-eye and boards take six of them.
     let beyond = 3 * fit.shots.iter().filter(|s| s.robot.is_some()).count() as i64 - 6;
     j.at_best(Verdict::BadlyDetermined, beyond < LEAST_NUMBERS, || {
         format!("{} numbers tell the robot's scatter, {LEAST_NUMBERS} are needed", beyond.max(0))
     });
-    // An arm that scatters by far less than boards are seen to takes up little of what is left: it hardly matters for
-    // points, but whoever wants to know the arm by this number does not.
+    // An arm that scatters far less than the measured boards has little redundancy of its own. It hardly affects
+    // scanned points, but its scatter is then poorly known.
     let told = fit.freedom[3];
     j.at_best(Verdict::Usable, beyond >= LEAST_NUMBERS && told < LEAST_NUMBERS as f64, || {
         format!(

@@ -1,5 +1,5 @@
-//! In: nothing. Out: a stop of the calibration as the joint solve takes it: a board's features, where the robot said it
-//! stood, the stripe and the spot on the board; what is left out of it and why.
+//! In: nothing. Out: the input of the joint solve for one stop: a board's features, the robot's reported pose, the
+//! stripe and the spot on the board; excluded parts with their reasons.
 //! Frame and unit: px in pictures; the robot's base and flange, mm.
 
 use crate::calibrate::laser_plane::views::StripePeak;
@@ -7,21 +7,21 @@ use crate::calibrate::measured_pose::SeenBoard;
 use crate::geometry::{Base, Flange, Rigid, Vec2};
 use nalgebra::Matrix2;
 
-/// Where the robot said that it stood, before a board that does not move against its carrier.
+/// The robot's reported pose at a stop, and the board's fixed pose on its carrier.
 #[derive(Clone, Copy, Debug)]
 pub struct Reported {
     /// base_from_flange, mm.
     pub pose: Rigid<Base, Flange>,
-    /// Which of the boards' places: an index below [`super::unknowns::State::far_from_board`]'s length.
+    /// Which of the boards' poses: an index into [`super::unknowns::State::far_from_board`].
     pub place: usize,
 }
 
 /// The pointer's spot on the board.
 #[derive(Clone, Copy, Debug)]
 pub struct Spot {
-    /// Its centre, px.
+    /// Centre, px.
     pub pixel: Vec2,
-    /// px².
+    /// Covariance of the centre, px².
     pub covariance: Matrix2<f64>,
 }
 
@@ -30,20 +30,20 @@ pub struct Spot {
 pub struct Shot {
     /// The board's features in room light.
     pub seen: SeenBoard,
-    /// `None` where no robot says where the board is: it tells of camera, sheet and beam alone.
+    /// `None` without a robot's pose: the stop then determines only camera, laser plane and beam.
     pub robot: Option<Reported>,
-    /// The stripe's peaks on the board, those that are light of the sheet ([`thinned`]).
+    /// The stripe's peaks on the board that belong to the laser plane ([`thinned`]).
     pub stripe: Vec<StripePeak>,
     /// The pointer's spot on the board.
     pub spot: Option<Spot>,
 }
 
-/// Peaks of one stop that are handed to the solve at most: a straight line on a flat board has two numbers, and speckle
-/// makes neighbours alike.
+/// Largest number of peaks of one stop in the solve: a straight line on a flat board has two parameters, and
+/// neighbours share speckle.
 pub const PEAKS_A_STOP: usize = 48;
 
-/// Neighbours along the stripe averaged until [`PEAKS_A_STOP`] are left; `peaks` in order along the stripe. Within a
-/// group the stripe is straight: a lens bends it by less than 1e-3 px over ten.
+/// Averages neighbouring peaks until at most [`PEAKS_A_STOP`] remain; `peaks` in order along the stripe. Within a
+/// group the stripe is straight: a lens bends it by less than 1e-3 px over ten peaks.
 pub fn thinned(peaks: &[StripePeak]) -> Vec<StripePeak> {
     let group = peaks.len().div_ceil(PEAKS_A_STOP).max(1);
     let mean = |g: &[StripePeak]| {
@@ -67,9 +67,9 @@ pub enum Part {
     Stripe,
     /// The pointer's spot.
     Spot,
-    /// Where the robot says that the flange is.
+    /// The position of the flange that the robot reports.
     RobotPlace,
-    /// How the robot says that the flange is turned.
+    /// The orientation of the flange that the robot reports.
     RobotTurn,
 }
 
@@ -77,7 +77,7 @@ impl Part {
     /// All of them, in the order of [`super::options::Noise::factors`].
     pub const ALL: [Part; 5] = [Part::Features, Part::Stripe, Part::Spot, Part::RobotPlace, Part::RobotTurn];
 
-    /// For people.
+    /// Name for messages.
     pub fn words(self) -> &'static str {
         match self {
             Part::Features => "the board's corners",
@@ -89,13 +89,13 @@ impl Part {
     }
 }
 
-/// A part of a stop that does not count.
+/// A part of a stop that was excluded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LeftOut {
-    /// Of the picture.
+    /// Name of the picture.
     pub name: String,
-    /// What of it.
+    /// The excluded part.
     pub part: Part,
-    /// Why, in words.
+    /// The reason, in words.
     pub why: String,
 }

@@ -1,5 +1,5 @@
-//! In: stops, a start. Out: everything that they share by maximum likelihood, with joint covariance and the noise of
-//! every source; what was left out and why.
+//! In: stops, a start. Out: all shared unknowns by maximum likelihood, with joint covariance and the noise of every
+//! source; excluded parts with their reasons.
 //! Frame and unit: see `unknowns`; mm, rad, px (docs/math.md, Joint calibration).
 
 use super::noise::{Leavings, leavings};
@@ -13,30 +13,30 @@ use nalgebra::DMatrix;
 
 /// What a joint solve found.
 pub struct JointFit {
-    /// Everything that was solved for.
+    /// The solved unknowns.
     pub state: State,
-    /// Where the unknowns stand in the covariance.
+    /// Positions of the unknowns in the covariance.
     pub layout: Layout,
-    /// Of the shared unknowns; zero where nothing in the data speaks of one (no robot, no stripe, no spot).
+    /// Covariance of the shared unknowns; zero for those without data (no robot, no stripe, no spot).
     pub covariance: DMatrix<f64>,
-    /// The covariance's part that each source makes, in the order of [`Part::ALL`].
+    /// Contribution of each source to the covariance, in the order of [`Part::ALL`].
     pub shares: Vec<DMatrix<f64>>,
-    /// What each source scatters by.
+    /// Noise of each source.
     pub noise: Noise,
-    /// Degrees of freedom that tell it, in the order of [`Part::ALL`].
+    /// Degrees of freedom that determine each noise, in the order of [`Part::ALL`].
     pub freedom: [f64; 5],
-    /// The stops that count, without the parts that were left out.
+    /// The used stops, without excluded parts.
     pub shots: Vec<Shot>,
-    /// What does not count.
+    /// The excluded parts.
     pub left_out: Vec<LeftOut>,
-    /// Corners' distance from where they are expected, rms per coordinate, px.
+    /// rms distance of the corners from their expected pixels, per coordinate, px.
     pub features_rms_px: f64,
-    /// Whether state and noise came to rest at a minimum.
+    /// Whether state and noise converged to a minimum.
     pub end: End,
 }
 
 impl JointFit {
-    /// Whether anything in the data speaks of a part.
+    /// Whether the data contains this part.
     pub fn has(&self, part: Part) -> bool {
         has(&self.shots, part)
     }
@@ -51,7 +51,7 @@ fn has(shots: &[Shot], part: Part) -> bool {
     })
 }
 
-/// Unknowns that nothing speaks of.
+/// Unknowns without data; they are held fixed.
 fn held(shots: &[Shot], l: &Layout) -> Vec<usize> {
     let mut hold = Vec::new();
     if !has(shots, Part::RobotPlace) {
@@ -94,10 +94,10 @@ struct Round {
     end: End,
 }
 
-/// Fits of states and noise by turns, at most.
+/// Largest number of rounds that alternate between state and noise.
 const ROUNDS: usize = 60;
 
-/// Fits and learns the noise until both stand still.
+/// Fits the state and estimates the noise in turns until both are stable.
 fn settle(shots: &[Shot], start: &State, noise: Noise, layout: &Layout, o: &JointOptions) -> Result<Round> {
     let prior = o.camera_prior.as_ref().and_then(|p| prior(p, &o.camera_free));
     let mut terms = Terms { shots, mount: o.mount, layout, noise, peak_sigma_mm: Vec::new(), prior };
@@ -119,7 +119,7 @@ fn settle(shots: &[Shot], start: &State, noise: Noise, layout: &Layout, o: &Join
         let settled = next.factors().iter().zip(terms.noise.factors()).all(|(a, b)| (a / b - 1.0).abs() < 2e-3);
         let last = round + 1 == ROUNDS;
         if (settled && round > 0) || last {
-            // Noise that still moves says as little as a cost that still falls.
+            // A noise that still changes means as little convergence as a cost that still falls.
             let end = if settled { end } else { end.max(End::Exhausted) };
             return Ok(Round { state, leavings: left, noise: terms.noise, covariance, end });
         }
@@ -128,15 +128,15 @@ fn settle(shots: &[Shot], start: &State, noise: Noise, layout: &Layout, o: &Join
     unreachable!("the last round returns")
 }
 
-/// What may be left out as one, and at most which share of the stops.
+/// Groups of parts that are excluded together, and the share of the stops that may be excluded.
 const GROUPS: [&[Part]; 4] = [&[Part::Features], &[Part::Stripe], &[Part::Spot], &[Part::RobotPlace, Part::RobotTurn]];
 const CONTRADICTING: f64 = 1.0 / 3.0;
 
-/// Solves for everything that the stops share. `start` has a board's pose for each stop and a place for each index in
-/// [`super::shots::Reported::place`]; `noise` is where the search for each source's scatter begins.
+/// Solves for all shared unknowns. `start` has a board pose for each stop and a fixed pose for each index in
+/// [`super::shots::Reported::place`]. `noise`: start values for the noise of each source.
 ///
 /// # Errors
-/// Fewer than three stops; what is not determined.
+/// Fewer than three stops, or unknowns that are not determined.
 pub fn solve(shots: &[Shot], start: &State, noise: Noise, o: &JointOptions) -> Result<JointFit> {
     o.check()?;
     if shots.len() < 3 {
@@ -183,14 +183,15 @@ pub fn solve(shots: &[Shot], start: &State, noise: Noise, o: &JointOptions) -> R
     }
 }
 
-/// The stop and group of parts that stand out most, beside what is usual of that group: index, parts, squared ratio.
+/// The stop and group of parts that stand out most, relative to the usual value of that group: index, parts, squared
+/// ratio.
 fn worst(left: &Leavings, shots: usize) -> Option<(usize, &'static [Part], f64)> {
     let mut out: Option<(usize, &'static [Part], f64)> = None;
     for group in GROUPS {
         let ratios: Vec<f64> = (0..shots).map(|i| left.stands_out(i, group)).collect();
         let mut known: Vec<f64> = ratios.iter().copied().filter(|r| *r > 0.0).collect();
         known.sort_by(f64::total_cmp);
-        // One bad stop among few raises the noise of all: the middle one says what is usual.
+        // One bad stop among few raises the noise of all, so the median stands for the usual value.
         let usual = known.get(known.len() / 2).copied().unwrap_or(1.0).clamp(1e-6, 1.0);
         for (i, r) in ratios.iter().enumerate() {
             if out.as_ref().is_none_or(|o| r / usual > o.2) {

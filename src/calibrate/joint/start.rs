@@ -1,5 +1,5 @@
-//! In: stops and a camera that is roughly right. Out: a state near the answer, in closed forms that a third of wrong
-//! stops does not move.
+//! In: stops and an approximate camera. Out: a start state by closed forms that are robust against a third of wrong
+//! stops.
 //! Frame and unit: see `unknowns`; mm, rad, px.
 
 use super::options::JointOptions;
@@ -17,7 +17,7 @@ use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Plane, Ray, Rigid, Vec3, orthonormalise};
 
-/// The board's pose in a picture.
+/// Measures the board's pose in a picture.
 pub fn board(camera: &Intrinsics, seen: &SeenBoard) -> Result<MeasuredPose> {
     let points = seen.pixels.iter().zip(&seen.sigmas_px).enumerate();
     let points = points.map(|(feature_id, (&pixel, &sigma_px))| BoardPoint { feature_id, pixel, sigma_px }).collect();
@@ -26,9 +26,9 @@ pub fn board(camera: &Intrinsics, seen: &SeenBoard) -> Result<MeasuredPose> {
     measure(seen, camera, &start.camera_from_board)
 }
 
-/// A start for all that the stops speak of; `places` is how many places of boards they name. What nothing speaks of
-/// is taken from `given`, else it is the camera's own frame, axis or middle plane and stays there. Stops without a
-/// board's pose are left out.
+/// A start state for all parts that the stops contain. `places`: number of boards' poses that the stops refer to.
+/// Unknowns without data come from `given`; without it they are the camera's own frame, axis or middle plane. Stops
+/// whose board has no pose are removed.
 pub fn start(
     shots: &mut Vec<Shot>,
     places: usize,
@@ -72,7 +72,7 @@ pub fn start(
     ))
 }
 
-/// Hand-eye from the place that most stops show, the boards' places by it.
+/// Hand-eye from the board's pose that most stops refer to, then all boards' poses from that.
 fn chain(
     shots: &[Shot],
     measured: &[MeasuredPose],
@@ -105,7 +105,7 @@ fn chain(
             return Rigid::identity();
         }
         let rotation = orthonormalise(&each.iter().map(|w| w.rotation).sum());
-        // The middle one of each coordinate: a board that was moved once does not move it.
+        // Median of each coordinate: robust against a board that was moved once.
         let middle = |k: usize| {
             let mut v: Vec<f64> = each.iter().map(|w| w.translation[k]).collect();
             v.sort_by(f64::total_cmp);
@@ -116,7 +116,7 @@ fn chain(
     Ok((x, all.iter().map(mean).collect()))
 }
 
-/// The sheet that the stripes of most pictures lie on.
+/// The laser plane on which the stripes of most pictures lie.
 fn sheet(shots: &[Shot], boards: &[Rigid<Camera, Board>], camera: &Intrinsics) -> Option<Plane<Camera>> {
     let peaks: Vec<Seen> = shots
         .iter()
@@ -127,11 +127,11 @@ fn sheet(shots: &[Shot], boards: &[Rigid<Camera, Board>], camera: &Intrinsics) -
     if peaks.len() < 3 {
         return None;
     }
-    // A camera that is only roughly right bends the sheet.
+    // An approximate camera bends the sheet, hence the wide gate.
     majority(&peaks, boards, camera, &LaserPlaneOptions { gate_px: 10.0, ..LaserPlaneOptions::default() }).ok()
 }
 
-/// The line that most spots lie on.
+/// The line on which most spots lie.
 fn beam(shots: &[Shot], boards: &[Rigid<Camera, Board>], camera: &Intrinsics) -> Option<Ray<Camera>> {
     let lit = |(s, board): (&Shot, &Rigid<Camera, Board>)| {
         let n = camera.normalised_from_pixel(&s.spot?.pixel)?;

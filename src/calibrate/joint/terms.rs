@@ -1,4 +1,4 @@
-//! In: stops at a state. Out: each measurement's residual in sigmas with its derivatives by the unknowns.
+//! In: stops at a state. Out: the residual of each measurement in sigmas, with its derivatives by the unknowns.
 //! Frame and unit: see `unknowns`; residuals in sigmas (docs/math.md, Joint calibration (1) to (5)).
 
 use super::options::{CameraPrior, Noise};
@@ -15,10 +15,10 @@ use crate::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Twist, Vec2, Vec
 use crate::solve::{Blocks, Problem, Residuals};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix2x3, SMatrix};
 
-/// A residual as [`Terms::visit`] hands it over: of which part and stop (`None`: the camera that was given), in
-/// sigmas; the unknowns that it depends on and its derivatives by them, row by row.
+/// A residual as [`Terms::visit`] reports it: its part and stop, its value in sigmas, the unknowns that it depends
+/// on, and its derivatives by them, row by row.
 pub struct Term<'a> {
-    /// `None`: the camera that was given.
+    /// `None` for the prior of the camera.
     pub part: Option<Part>,
     /// Index of the stop.
     pub shot: usize,
@@ -26,7 +26,7 @@ pub struct Term<'a> {
     pub residual: &'a [f64],
     /// Indices of the unknowns.
     pub columns: &'a [usize],
-    /// Row by row; empty where none was asked for.
+    /// Row by row; empty if no derivatives were requested.
     pub jacobian: &'a [f64],
 }
 
@@ -36,26 +36,26 @@ pub struct Terms<'a> {
     pub shots: &'a [Shot],
     /// Who carries the camera.
     pub mount: Mount,
-    /// Where the unknowns stand.
+    /// Positions of the unknowns.
     pub layout: &'a Layout,
-    /// What the sources scatter by.
+    /// Noise of the sources.
     pub noise: Noise,
-    /// Of each stop: the sigma of its peaks as a distance from the sheet, mm ([`Terms::settle`]).
+    /// For each stop: the sigmas of its peaks as distances from the laser plane, mm ([`Terms::settle`]).
     pub peak_sigma_mm: Vec<Vec<f64>>,
-    /// The camera that was given, and the root of its information over the free parameters.
+    /// The prior of the camera: its values, and the root of its information over the free parameters.
     pub prior: Option<(DVector<f64>, DMatrix<f64>)>,
 }
 
-/// Where the flange is expected, against what the robot reports, with derivatives by hand-eye, the board's place and
-/// the board's pose before the camera: three rows of the place, three of the turn.
+/// Expected minus reported pose of the flange, with derivatives by hand-eye, the board's fixed pose and the board's
+/// pose in the camera frame. Three rows of the position, three of the rotation.
 pub struct Link {
     /// Expected minus reported: mm, rad.
     pub e: SMatrix<f64, 6, 1>,
     /// By the hand-eye transform.
     pub by_hand_eye: SMatrix<f64, 6, 6>,
-    /// By the board's place.
+    /// By the board's pose on its carrier.
     pub by_place: SMatrix<f64, 6, 6>,
-    /// By the board's pose before the camera.
+    /// By the board's pose in the camera frame.
     pub by_board: SMatrix<f64, 6, 6>,
 }
 
@@ -67,7 +67,7 @@ fn blocks(place: [Mat3; 2], turn: Mat3) -> SMatrix<f64, 6, 6> {
     j
 }
 
-/// base_from_flange as the chain expects it.
+/// The pose base_from_flange that the chain expects.
 pub fn flange(
     mount: Mount,
     x: &Rigid<Near, Camera>,
@@ -102,7 +102,7 @@ pub fn link(
     let (rx, rw, rt) = (x.rotation, w.rotation, t.rotation);
     match mount {
         Mount::EyeInHand => {
-            // The flange's origin seen from the camera, and on the board.
+            // The flange's origin in the camera frame, and in the board frame.
             let c = -(rx.transpose() * x.translation);
             let b = rt.transpose() * (c - t.translation);
             let far_from_camera = rw * rt.transpose();
@@ -115,7 +115,7 @@ pub fn link(
             }
         }
         Mount::EyeToHand => {
-            // The flange's origin on the board, and seen from the camera.
+            // The flange's origin in the board frame, and in the camera frame.
             let d = -(rw.transpose() * w.translation);
             let q = t.point(&d);
             let near_from_far = rx * rt * rw.transpose();
@@ -129,8 +129,8 @@ pub fn link(
     }
 }
 
-/// A peak's distance from the sheet in sigmas, and its derivatives by the sheet's three numbers, the board's six, and
-/// by the camera.
+/// A peak's distance from the laser plane in sigmas, and its derivatives by the plane's three parameters, the board's
+/// six, and the camera's.
 fn peak(
     s: &State,
     board: &Rigid<Camera, Board>,
@@ -148,7 +148,7 @@ fn peak(
     Some((r, j, -(by_ray * seen.ray_by_pixel * by_camera)))
 }
 
-/// Where the beam meets a board.
+/// Intersection of the beam with a board, camera frame, mm.
 pub fn lit(s: &State, board: &Rigid<Camera, Board>) -> Option<Vec3> {
     let normal: Vec3 = board.rotation.column(2).into();
     let slope = normal.dot(&s.beam.direction);
@@ -173,7 +173,7 @@ pub fn spot(s: &State, board: &Rigid<Camera, Board>, seen: &Vec2) -> Option<Spot
     let at = project(&s.camera, &p)?;
     let normal: Vec3 = board.rotation.column(2).into();
     let d = s.beam.direction;
-    // A shift of the lit point that leaves the board is made up for along the beam.
+    // The component of a shift that leaves the board is compensated by a shift along the beam.
     let back: Mat3 = d * normal.transpose() / normal.dot(&d);
     let slide: Mat3 = Mat3::identity() - back;
     let far = (p - s.beam.origin).dot(&d);
@@ -197,7 +197,8 @@ fn whitener(spot: &Spot) -> Option<Matrix2<f64>> {
 }
 
 impl Terms<'_> {
-    /// Fixes the peaks' sigmas in mm at a state: the scale from px to mm follows sheet and boards.
+    /// Computes the peaks' sigmas in mm at a state: the scale from px to mm depends on the laser plane and the
+    /// boards.
     pub fn settle(&mut self, s: &State) {
         let sigma = |(shot, board): (&Shot, &Rigid<Camera, Board>)| -> Vec<f64> {
             let of = |p: &StripePeak| {
@@ -210,7 +211,7 @@ impl Terms<'_> {
         self.peak_sigma_mm = self.shots.iter().zip(&s.boards).map(sigma).collect();
     }
 
-    /// Hands over every residual at a state. `None` where the state is impossible.
+    /// Calls `out` with every residual at a state. `None` if the state is impossible.
     pub fn visit(&self, s: &State, wants: bool, out: &mut dyn FnMut(Term<'_>)) -> Option<()> {
         let mut columns = Vec::new();
         for i in 0..self.shots.len() {
@@ -364,7 +365,7 @@ impl Problem for Terms<'_> {
     }
 }
 
-/// The root of a given camera's information over the free parameters: only those that are known better than not at all.
+/// The root of the prior's information over the free parameters. `None` if one of them has no uncertainty.
 pub fn prior(given: &CameraPrior, camera_free: &[usize]) -> Option<(DVector<f64>, DMatrix<f64>)> {
     let n = camera_free.len();
     let sigma = DVector::from_fn(n, |i, _| given.covariance[(camera_free[i], camera_free[i])].max(0.0).sqrt());

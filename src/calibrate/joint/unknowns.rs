@@ -1,5 +1,7 @@
-//! In: what is solved for. Out: the state, which step moves what, and where each unknown stands in the equations.
-//! Frame and unit: camera, its carrier (near: flange or base) and the board's (far: base or flange); mm, rad, px.
+//! In: the unknowns of the joint solve. Out: their state, the effect of a step, and the position of each unknown in
+//! the equations.
+//! Frame and unit: camera, its carrier (near: flange or base) and the board's carrier (far: base or flange); mm, rad,
+//! px.
 
 use crate::calibrate::hand_eye::closed::{Far, Near};
 use crate::calibrate::laser_plane::terms::stepped;
@@ -7,67 +9,68 @@ use crate::calibrate::pointer::beam::moved_beam;
 use crate::camera::{Intrinsics, Parameters};
 use crate::geometry::{Board, Camera, LeftStep, Plane, Ray, Rigid, Twist, Vec3};
 
-/// Everything that is solved for.
+/// All unknowns of the joint solve.
 #[derive(Clone, Debug)]
 pub struct State {
     /// Camera and lens.
     pub camera: Intrinsics,
-    /// The hand-eye transform, mm; as it came where no robot is in the data.
+    /// The hand-eye transform, mm; stays at its start value without robot data.
     pub near_from_camera: Rigid<Near, Camera>,
-    /// Where each board is fixed, mm.
+    /// Pose of each board on its carrier, mm.
     pub far_from_board: Vec<Rigid<Far, Board>>,
-    /// The sheet of light, mm; as it came where no stripe is in the data.
+    /// The laser plane, mm; stays at its start value without stripe data.
     pub plane: Plane<Camera>,
-    /// The pointer's beam, mm; as it came where no spot is in the data.
+    /// The pointer's beam, mm; stays at its start value without spot data.
     pub beam: Ray<Camera>,
-    /// The board before the camera at each stop, mm.
+    /// The board's pose in the camera frame at each stop, mm.
     pub boards: Vec<Rigid<Camera, Board>>,
 }
 
-/// Where unknowns stand in a step: the camera's free numbers, hand-eye, boards' places, sheet, beam; then six a stop.
+/// Positions of the unknowns in a step: the camera's free parameters, hand-eye, boards' poses, laser plane, beam;
+/// then six per stop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
     /// Indices of the camera's free parameters into [`crate::camera::NAMES`].
     pub camera: Vec<usize>,
-    /// How many places of boards there are.
+    /// Number of boards' poses.
     pub places: usize,
-    /// How many stops.
+    /// Number of stops.
     pub shots: usize,
 }
 
 impl Layout {
-    /// Of the hand-eye transform's six: translation, left rotation in the near frame.
+    /// Position of the hand-eye transform's six parameters: translation, left rotation in the near frame.
     pub fn hand_eye(&self) -> usize {
         self.camera.len()
     }
-    /// Of a board's place, six: translation, left rotation in the far frame.
+    /// Position of the six parameters of a board's pose on its carrier: translation, left rotation in the far frame.
     pub fn place(&self, i: usize) -> usize {
         self.hand_eye() + 6 + 6 * i
     }
-    /// Of the sheet's two tilts and its offset.
+    /// Position of the laser plane's two tilts and its offset.
     pub fn plane(&self) -> usize {
         self.place(self.places)
     }
-    /// Of the beam's two shifts and two tilts.
+    /// Position of the beam's two shifts and two tilts.
     pub fn beam(&self) -> usize {
         self.plane() + 3
     }
-    /// How many unknowns all stops share; the first stop's come next.
+    /// Number of unknowns that all stops share; those of the first stop follow.
     pub fn shared(&self) -> usize {
         self.beam() + 4
     }
-    /// Of the board's pose at a stop, six ([`Twist`]).
+    /// Position of the six parameters of the board's pose at a stop ([`Twist`]).
     pub fn shot(&self, i: usize) -> usize {
         self.shared() + 6 * i
     }
-    /// All.
+    /// Number of all unknowns.
     pub fn width(&self) -> usize {
         self.shot(self.shots)
     }
 }
 
 impl State {
-    /// After a step of all unknowns, or of the shared ones alone.
+    /// The state after a step of all unknowns, or of only the shared ones.
     pub fn moved(&self, l: &Layout, s: &[f64]) -> State {
         let mut change = Parameters::zeros();
         l.camera.iter().zip(s).for_each(|(&i, d)| change[i] = *d);

@@ -1,5 +1,5 @@
-//! In: a state, depths. Out: the places in the picture where the sheet's light can be seen there; how a point that is
-//! scanned at one moves with everything that was calibrated; what error is to be expected of it.
+//! In: a state, depths. Out: the pixels at which the laser plane is seen at these depths; the derivatives of a point
+//! scanned there by all calibrated parameters; its expected error.
 //! Frame and unit: points in the camera's carrier (flange or base), mm (docs/math.md, Joint calibration (8)).
 
 use super::terms::ray;
@@ -8,10 +8,10 @@ use crate::calibrate::laser_plane::terms::tangents;
 use crate::geometry::{Mat3, Vec2, Vec3, skew};
 use nalgebra::DMatrix;
 
-/// Rows and columns of places that are looked at in the picture.
+/// Rows and columns of the pixel grid in the picture.
 const GRID: u32 = 24;
 
-/// Pixels at which the sheet's light lies between these depths, evenly over the picture.
+/// Pixels of a regular grid at which the laser plane lies between these depths.
 pub fn places(s: &State, depths: [f64; 2]) -> Vec<Vec2> {
     let at = |i: u32, n: u32| (f64::from(i) + 0.5) / f64::from(GRID) * f64::from(n) - 0.5;
     let all = (0..GRID * GRID).map(|i| Vec2::new(at(i % GRID, s.camera.width), at(i / GRID, s.camera.height)));
@@ -23,7 +23,7 @@ pub fn places(s: &State, depths: [f64; 2]) -> Vec<Vec2> {
     lit
 }
 
-/// Where a pixel's ray meets the sheet, camera frame.
+/// Intersection of a pixel's ray with the laser plane, camera frame, mm.
 fn camera_point(s: &State, pixel: &Vec2) -> Option<Vec3> {
     let n = s.camera.normalised_from_pixel(pixel)?;
     let ray = Vec3::new(n.x, n.y, 1.0);
@@ -31,12 +31,12 @@ fn camera_point(s: &State, pixel: &Vec2) -> Option<Vec3> {
     (depth > 0.0 && depth.is_finite()).then(|| ray * depth)
 }
 
-/// The point that light at a pixel stands for, in the camera's carrier.
+/// The scanned point of a pixel, in the camera's carrier, mm.
 pub fn scanned(s: &State, pixel: &Vec2) -> Option<Vec3> {
     Some(s.near_from_camera.point(&camera_point(s, pixel)?))
 }
 
-/// Its derivatives by the shared unknowns: three rows.
+/// The derivatives of [`scanned`] by the shared unknowns: three rows.
 pub fn by_unknowns(s: &State, l: &Layout, pixel: &Vec2) -> Option<DMatrix<f64>> {
     let (ray, ray_by_camera) = ray(&s.camera, pixel)?;
     let (normal, rotation) = (s.plane.normal, s.near_from_camera.rotation);
@@ -44,7 +44,7 @@ pub fn by_unknowns(s: &State, l: &Layout, pixel: &Vec2) -> Option<DMatrix<f64>> 
     let depth = s.plane.offset / slope;
     let p = ray * depth;
     let mut j = DMatrix::zeros(3, l.shared());
-    // A change of the ray moves the point along the sheet.
+    // A change of the ray moves the point within the laser plane.
     let slide: Mat3 = (Mat3::identity() - ray * normal.transpose() / slope) * depth;
     for (k, &c) in l.camera.iter().enumerate() {
         let change = Vec3::new(ray_by_camera[(0, c)], ray_by_camera[(1, c)], 0.0);
@@ -59,8 +59,8 @@ pub fn by_unknowns(s: &State, l: &Layout, pixel: &Vec2) -> Option<DMatrix<f64>> 
     Some(j)
 }
 
-/// Of all places together: the sum of JᵀJ over their number, so that the trace of its product with a covariance is
-/// the mean squared error of a scanned point, mm².
+/// Mean of JᵀJ over all places. The trace of its product with a covariance is the mean squared error of a scanned
+/// point, mm².
 pub fn weights(s: &State, l: &Layout, places: &[Vec2]) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(l.shared(), l.shared());
     let mut n = 0.0;
@@ -71,12 +71,12 @@ pub fn weights(s: &State, l: &Layout, places: &[Vec2]) -> DMatrix<f64> {
     if n > 0.0 { out / n } else { out }
 }
 
-/// Expected error of a scanned point, mm rms over the three axes together, from weights and a covariance.
+/// Expected error of a scanned point, rms over the length of its error vector, mm, from weights and a covariance.
 pub fn expected(weights: &DMatrix<f64>, covariance: &DMatrix<f64>) -> f64 {
     weights.component_mul(covariance).sum().max(0.0).sqrt()
 }
 
-/// How far points scanned with one calibration lie from those of another, mm rms, at the same pixels.
+/// rms distance between the points scanned with two calibrations at the same pixels, mm.
 pub fn apart(a: &State, b: &State, places: &[Vec2]) -> f64 {
     let d: Vec<f64> = places.iter().filter_map(|px| Some((scanned(a, px)? - scanned(b, px)?).norm_squared())).collect();
     (d.iter().sum::<f64>() / d.len().max(1) as f64).sqrt()

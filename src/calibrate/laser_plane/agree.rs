@@ -1,5 +1,5 @@
 //! In: stripe peaks on boards of measured pose. Out: the plane that most of them lie on, the pictures that agree with
-//! it, and a second plane in what is left over.
+//! it, and a second plane in the remaining peaks.
 //! Frame and unit: camera frame, mm; distances from a stripe in px.
 
 use super::options::{LaserPlaneOptions, refused};
@@ -10,17 +10,17 @@ use crate::fault::Result;
 use crate::geometry::{Board, Camera, Plane, Rigid, Vec3, fit_plane};
 use crate::solve::{ConsensusOptions, consensus};
 
-/// Light that lies on another plane.
+/// A second plane, found in the peaks outside the fit.
 #[derive(Clone, Debug)]
 pub struct SecondPlane {
-    /// Pictures that show it.
+    /// Pictures that show the second plane.
     pub views: Vec<String>,
-    /// Its distance from the fitted plane there, mm rms.
+    /// Distance of their peaks from the fitted plane, rms, mm.
     pub mm: f64,
 }
 
-/// The plane that most peaks lie on: consensus over triples from different pictures. Distances are in units of what a
-/// pixel covers at each peak's depth.
+/// The plane that most peaks lie on: consensus over triples from different pictures. Distances are in units of the
+/// footprint of a pixel at each peak's depth.
 pub(in crate::calibrate) fn majority(
     peaks: &[Seen],
     measured: &[Rigid<Camera, Board>],
@@ -50,7 +50,7 @@ pub(in crate::calibrate) fn majority(
     let plane = fit_plane::<Camera>(&agreeing)
         .ok_or_else(|| refused("the stripes of all pictures lie on one line in space".into()))?
         .0;
-    // The normal points away from the camera, as the format's examples do.
+    // The normal points away from the camera, as in the examples of the file format.
     Ok(if plane.offset < 0.0 { plane.flipped() } else { plane })
 }
 
@@ -64,8 +64,8 @@ pub(in crate::calibrate) fn near(
     on_board(pose, &p.ray).is_some_and(|x| plane.distance(&x).abs() < gate_px * mm_per_px(plane, pose, p))
 }
 
-/// Pictures of whose stripe enough lies near the plane. A reflection beside the stripe does not shorten what agrees; a
-/// stripe that crosses the plane's, of a board that moved, agrees over a short part.
+/// Pictures with enough of their stripe near the plane. A reflection beside the stripe does not shorten the agreeing
+/// part. The stripe on a board that moved crosses the plane's stripe and agrees only over a short part.
 pub(in crate::calibrate) fn agreeing(all: &[Seen], near: &[Seen], views: usize, o: &LaserPlaneOptions) -> Vec<bool> {
     let of = |peaks: &'_ [Seen], v: usize| -> Vec<Seen> { peaks.iter().filter(|p| p.view == v).copied().collect() };
     (0..views)
@@ -78,7 +78,7 @@ pub(in crate::calibrate) fn agreeing(all: &[Seen], near: &[Seen], views: usize, 
         .collect()
 }
 
-/// A plane that the light left over by the fit agrees on in three pictures or more.
+/// A plane on which the peaks outside the fit agree in three pictures or more.
 pub(in crate::calibrate) fn second_plane(
     rest: &[Seen],
     data: &Data,
@@ -101,7 +101,7 @@ pub(in crate::calibrate) fn second_plane(
     (names.len() >= 3).then_some(SecondPlane { views: names, mm })
 }
 
-/// Places along a stripe, in whole pixels: a measure of its length that several peaks at one place do not lengthen.
+/// Length of a stripe as the number of distinct whole pixels along it: several peaks at one position count once.
 fn length_px<'a>(peaks: impl Iterator<Item = &'a Seen>, along_x: bool) -> usize {
     let mut places: Vec<i64> = peaks.map(|p| if along_x { p.pixel.x } else { p.pixel.y }.round() as i64).collect();
     places.sort_unstable();
@@ -109,7 +109,7 @@ fn length_px<'a>(peaks: impl Iterator<Item = &'a Seen>, along_x: bool) -> usize 
     places.len()
 }
 
-/// Whether peaks run along the picture's rows rather than its columns.
+/// True if the peaks run along the picture's rows rather than its columns.
 fn along_x(peaks: &[&Seen]) -> bool {
     let span = |f: fn(&Seen) -> f64| {
         let (a, b) = peaks.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(f(p)), b.max(f(p))));

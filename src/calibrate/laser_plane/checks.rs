@@ -1,4 +1,4 @@
-//! In: a laser plane's fit. Out: whether each picture's stripe lies where the others predict it, how much the pictures
+//! In: the fit of a laser plane. Out: whether each picture's stripe lies where the others predict it, the pictures'
 //! scatter beyond their own sigmas, and the plane's error in the view.
 //! Frame and unit: camera frame, mm (docs/math.md, Laser plane (7) to (10)).
 
@@ -9,26 +9,26 @@ use crate::geometry::{Camera, Plane, Vec3};
 use crate::rig::Volume;
 use nalgebra::{DMatrix, Matrix3, SMatrix};
 
-/// One picture against the plane of the others.
+/// One picture compared with the plane of the others.
 pub(in crate::calibrate) struct HeldOut {
     /// The plane without this picture.
     pub(in crate::calibrate) plane: Option<Plane<Camera>>,
-    /// Squared distance of its stripe from where the others predict it, in sigmas of both; chi-square with 2 degrees of
-    /// freedom where the sigmas are right. Infinite where the others determine no plane, 0 for a picture without light.
+    /// Squared distance of its stripe from the position that the others predict, in sigmas of both; chi-square with 2
+    /// degrees of freedom if the sigmas are right. Infinite if the others determine no plane, 0 for a picture without
+    /// peaks.
     pub(in crate::calibrate) surprise: f64,
 }
 
-/// What the pictures say of each other.
+/// Check of the pictures against each other.
 pub(in crate::calibrate) struct Consistency {
     pub(in crate::calibrate) views: Vec<HeldOut>,
-    /// How much farther the pictures' stripes lie from the plane than their sigmas say, squared; 1 where these are
-    /// right.
+    /// Squared distance of the pictures' stripes from the plane relative to their sigmas; 1 if these are right.
     pub(in crate::calibrate) scatter2: f64,
     pub(in crate::calibrate) freedom: f64,
 }
 
-/// What the camera's own error adds to the sum of the pictures' squared distances over their sigmas: it moves boards
-/// and rays of each picture differently, and is stated by itself.
+/// Expected contribution of the camera's own error to the sum of the pictures' squared distances over their sigmas.
+/// That error moves boards and rays of each picture differently, and its uncertainty is stated separately.
 pub(in crate::calibrate) fn from_camera(
     data: &Data,
     state: &State,
@@ -44,7 +44,7 @@ pub(in crate::calibrate) fn from_camera(
     by.gradients.iter().enumerate().filter_map(one).sum()
 }
 
-/// By one Gauss-Newton step from the whole solution, picture by picture.
+/// By one Gauss-Newton step per picture, from the solution with all pictures.
 pub(in crate::calibrate) fn consistency(data: &Data, state: &State, factor: f64) -> Consistency {
     let said: Vec<Option<Says>> = (0..data.measured.len()).map(|v| says(data, state, v, factor)).collect();
     let (mut all, mut gradient) = (Matrix3::zeros(), Vec3::zeros());
@@ -75,7 +75,7 @@ fn held_out(says: Option<&Says>, all: &Matrix3<f64>, gradient: &Vec3, plane: &Pl
 }
 
 impl Consistency {
-    /// Surprises over what is usual among the used pictures.
+    /// Surprises relative to their usual size among the used pictures.
     pub(in crate::calibrate) fn beside(&self, used: &[bool]) -> Vec<f64> {
         let all: Vec<f64> = self.views.iter().map(|v| v.surprise).collect();
         scatter::beside(&all, |i| used[i])
@@ -109,10 +109,10 @@ pub(in crate::calibrate) fn depth_spread(data: &Data, s: &State) -> f64 {
     e[1].max(0.0).sqrt()
 }
 
-/// Places of the plane that the camera sees at the working depths.
+/// Points of the plane that the camera sees at the working depths.
 pub(in crate::calibrate) fn places_in_view(plane: &Plane<Camera>, camera: &Intrinsics, work: &Volume) -> Vec<Vec3> {
     let [a, b] = tangents(&plane.normal);
-    // In the plane: across = the direction with the least z, along = the other.
+    // Two directions in the plane: `across` has no z component, `along` is perpendicular to it.
     let Some(across) = (a * b.z - b * a.z).try_normalize(1e-12) else { return Vec::new() };
     let along = plane.normal.cross(&across);
     let foot = plane.normal * plane.offset;
@@ -134,7 +134,8 @@ pub(in crate::calibrate) fn places_in_view(plane: &Plane<Camera>, camera: &Intri
     out
 }
 
-/// Sigma of the distance between the fitted and the true plane, rms over some places, mm; infinite without a place.
+/// Sigma of the distance between the fitted and the true plane, rms over the given points, mm; infinite without
+/// points.
 pub(in crate::calibrate) fn expected_error(covariance: &DMatrix<f64>, places: &[Vec3]) -> f64 {
     let variance = |p: &Vec3| {
         let u = nalgebra::DVector::from_vec(vec![p.x, p.y, p.z, -1.0]);

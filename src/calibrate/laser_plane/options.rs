@@ -1,25 +1,25 @@
-//! In: what a person may choose about a laser plane. Out: the choice, checked; the refusal that all its judges share.
-//! Frame and unit: px, mm; each field says.
+//! In: a user's settings for the laser plane. Out: the checked settings, and the refusal that all checks share.
+//! Frame and unit: px, mm; stated per field.
 
 use crate::fault::{Fault, Result};
 
 /// Settings of [`super::solve::solve`].
 #[derive(Clone, Debug)]
 pub struct LaserPlaneOptions {
-    /// Peaks nearer to an edge of the print or the board than this many stripe widths are not used; 0..=20.
+    /// Peaks closer than this to an edge of the print or the board are not used, in stripe widths; 0..=20.
     pub edge_widths: f64,
-    /// Peaks farther than this from the stripe of the plane that most agree with never enter, px; 0.5..=50.
+    /// Peaks farther than this from the stripe of the consensus plane are never used, px; 0.5..=50.
     pub gate_px: f64,
-    /// Peaks with a larger residual than this many sigmas are left out; 2.5..=10.
+    /// Peaks with a larger residual than this are excluded, in sigmas; 2.5..=10.
     pub gate_sigmas: f64,
-    /// A picture is left out whose stripe lies farther than this from where the others predict it: squared, in sigmas
-    /// of both, two degrees of freedom; 9..=1000.
+    /// A picture is excluded if its stripe lies farther than this from the position that the others predict: squared,
+    /// in sigmas of both, two degrees of freedom; 9..=1000.
     pub gate_surprise: f64,
-    /// Share of the length of a picture's stripe that must agree for it to count; 0.1..=0.95.
+    /// Smallest share of the length of a picture's stripe that must agree for the picture to count; 0.1..=0.95.
     pub min_share: f64,
-    /// Fewest peaks a picture needs; 2..=10000.
+    /// Smallest number of peaks per picture; 2..=10000.
     pub min_peaks: usize,
-    /// Seed of the consensus.
+    /// Random seed of the consensus.
     pub seed: u64,
 }
 
@@ -38,7 +38,7 @@ impl Default for LaserPlaneOptions {
 }
 
 impl LaserPlaneOptions {
-    /// Refuses values out of the ranges that the fields state.
+    /// Refuses values outside the ranges stated at the fields.
     pub fn check(&self) -> Result<()> {
         let ranges = [
             ("edge_widths", self.edge_widths, 0.0, 20.0),

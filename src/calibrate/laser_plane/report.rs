@@ -1,5 +1,5 @@
-//! In: a laser-plane fit. Out: the verdict with reasons, figures and the next best picture, and the
-//! page a person reads; fit and verification apart.
+//! In: the fit of a laser plane. Out: the verdict with reasons, figures and the next best picture, and the report
+//! page; fit and verification are separate.
 //! Frame and unit: camera frame; mm, degrees, px.
 
 use super::checks::{expected_error, places_in_view};
@@ -18,14 +18,14 @@ use std::collections::BTreeMap;
 /// Names of the plane's covariance parameters.
 pub const PLANE_NAMES: [&str; 4] = ["nx", "ny", "nz", "offset_mm"];
 
-/// Under [`PLANE_NAMES`]; camera uncertainty included.
+/// The covariance under [`PLANE_NAMES`]; includes the camera's uncertainty.
 pub fn covariance(fit: &LaserPlaneFit) -> Covariance {
     Covariance::new(&PLANE_NAMES, &fit.covariance)
 }
 
-/// Beyond this many times their own sigmas the pictures' scatter is no more what pixels explain.
+/// Beyond this multiple of their own sigmas, the pictures' scatter is not explained by the pixels.
 const SCATTER: f64 = 3.0;
-/// Least spread of the stripes across their own direction, a share of the view.
+/// Smallest spread of the stripes perpendicular to their own direction, as a share of the view's width.
 const LEAST_SPREAD: f64 = 0.02;
 
 /// What a verdict rests on.
@@ -33,12 +33,12 @@ struct Evidence<'a> {
     fit: &'a LaserPlaneFit,
     used: Vec<&'a ViewResidual>,
     work: &'a Volume,
-    /// Expected error at the work, and the camera's share of it, mm.
+    /// Expected error at the working depths, and the camera's share of it, mm.
     expected: f64,
     camera_part: f64,
     /// Sigma of the plane's tilt, rad.
     tilt: f64,
-    /// Largest angle between two boards, degrees.
+    /// Largest angle between two boards' normals, degrees.
     spread: f64,
 }
 
@@ -79,8 +79,8 @@ pub fn judge(fit: &LaserPlaneFit, views: &[StripeView], camera: &Intrinsics, lim
 }
 
 impl Evidence<'_> {
-    /// Whether tilts, stripes and pictures are enough, and were seen where the work is. `view_mm`: how wide the
-    /// camera sees there.
+    /// Checks that tilts, stripes and pictures suffice and cover the working depths. `view_mm`: width of the camera's
+    /// view there, mm.
     fn determined(&self, view_mm: f64, j: &mut Judgement) {
         let Evidence { fit, work, spread, .. } = *self;
         let used = self.used.len();
@@ -114,7 +114,7 @@ impl Evidence<'_> {
         });
     }
 
-    /// What the error comes from, and the next best picture.
+    /// Reasons for the error, and the next best picture.
     fn advise(&self, j: &mut Judgement) {
         let Evidence { work, camera_part, .. } = *self;
         if camera_part > 0.0 {
@@ -165,7 +165,7 @@ impl Evidence<'_> {
     }
 }
 
-/// What the pictures say against each other, and who says it.
+/// The pictures that contradict the others, and the number that they contradict.
 fn contradictions(fit: &LaserPlaneFit, views: &[StripeView], j: &mut Judgement) {
     for v in fit.views.iter().filter(|v| !v.used) {
         j.at_best(Verdict::Usable, true, || {
@@ -195,7 +195,7 @@ fn contradictions(fit: &LaserPlaneFit, views: &[StripeView], j: &mut Judgement) 
             )
         });
     }
-    // The plane's stripe, drawn into pictures that it was not fitted to, must lie within their light.
+    // The plane's stripe must lie within the light of pictures that it was not fitted to.
     let mut widths: Vec<f64> = views.iter().flat_map(|v| v.peaks.iter().map(|p| p.width_px)).collect();
     widths.sort_by(f64::total_cmp);
     let width = widths.get(widths.len() / 2).copied().unwrap_or(0.0);
@@ -229,7 +229,7 @@ fn contradictions(fit: &LaserPlaneFit, views: &[StripeView], j: &mut Judgement) 
     }
 }
 
-/// The report.
+/// The report page.
 pub fn page(fit: &LaserPlaneFit, views: &[StripeView], quality: &Quality, size: (u32, u32)) -> Page {
     let mut page = Page::new("Laser plane calibration");
     page.verdict(quality);

@@ -1,5 +1,5 @@
-//! In: stripe peaks on boards of measured pose. Out: the laser plane by robust maximum likelihood,
-//! the boards' poses free within their own uncertainty, with covariance and hold-out errors.
+//! In: stripe peaks on boards of measured pose. Out: the laser plane by robust maximum likelihood with covariance and
+//! hold-out errors; the boards' poses may move within their own uncertainty.
 //! Frame and unit: camera frame, mm; peaks in px (docs/math.md, Laser plane (1) to (6)).
 
 pub use super::agree::SecondPlane;
@@ -17,85 +17,87 @@ use crate::geometry::{Board, Camera, Plane, Rigid};
 use crate::solve::{End, Loss, Solution};
 use nalgebra::{DMatrix, Matrix6};
 
-/// Why a peak does not count.
+/// Whether a peak is used, and if not, why.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PeakUse {
     /// In the fit.
     Used,
-    /// Not on the board: dots, halos, the background, reflections beside it.
+    /// Not on the board: dots, halos, the background, reflections beside the board.
     OffBoard,
-    /// Near an edge of the print.
+    /// Close to an edge of the print.
     AtEdge,
     /// On the board, but off the plane: a reflection.
     Disagrees,
-    /// Its whole picture was left out.
+    /// The entire picture was excluded.
     PictureLeftOut,
 }
 
-/// How one picture fits.
+/// Residuals of one picture.
 #[derive(Clone, Debug)]
 pub struct ViewResidual {
-    /// Of the picture.
+    /// Name of the picture.
     pub name: String,
-    /// In the fit; false: it was left out.
+    /// True if the picture is in the fit; false if it was excluded.
     pub used: bool,
-    /// How many were found in the picture.
+    /// Number of peaks found in the picture.
     pub peaks: usize,
-    /// How many of them are in the fit.
+    /// Number of them in the fit.
     pub peaks_used: usize,
-    /// rms of the used peaks' distance from the fitted stripe, px and mm.
+    /// rms distance of the used peaks from the fitted stripe, px.
     pub px: f64,
     /// rms of the used peaks' distance from the laser plane, mm.
     pub mm: f64,
-    /// The same against the plane fitted without this picture.
+    /// rms distance of the peaks from the stripe of the plane fitted without this picture, px.
     pub holdout_px: f64,
-    /// rms of their distance from the plane fitted without this picture, mm.
+    /// rms distance of the peaks from the plane fitted without this picture, mm.
     pub holdout_mm: f64,
-    /// Squared distance of its stripe from where the others predict it, in sigmas of both; 2 is usual.
+    /// Squared distance of the picture's stripe from the position that the others predict, in sigmas of both; 2 is
+    /// usual.
     pub surprise: f64,
-    /// The same over what is usual among these pictures, where that is more than chance.
+    /// The same divided by its usual size among these pictures, if that is larger than chance explains.
     pub beside: f64,
-    /// It was left out although it shows a stripe: its light lies elsewhere.
+    /// The picture shows a stripe but was excluded, because the stripe lies elsewhere.
     pub contradicts: bool,
-    /// How much worse its features fit the board than those of the other pictures.
+    /// Factor by which its features fit the board worse than those of the other pictures.
     pub board_misfit: f64,
 }
 
 /// What [`solve`] found.
 #[derive(Clone, Debug)]
 pub struct LaserPlaneFit {
-    /// The sheet of light, mm.
+    /// The laser plane, mm.
     pub plane: Plane<Camera>,
-    /// nx ny nz offset_mm, rank 3; what pixels, poses and the pictures' scatter say, camera uncertainty included.
+    /// Covariance of nx ny nz offset_mm, rank 3, by pixels, poses and the pictures' scatter; includes the camera's
+    /// uncertainty.
     pub covariance: DMatrix<f64>,
-    /// The same with the camera taken as exact.
+    /// The same covariance with the camera taken as exact.
     pub covariance_camera_exact: DMatrix<f64>,
-    /// One a view, in the order given.
+    /// One entry per view, in the order given.
     pub views: Vec<ViewResidual>,
-    /// One a peak, by view.
+    /// One entry per peak, by view.
     pub uses: Vec<Vec<PeakUse>>,
-    /// Peaks' residuals over their stated sigma: 1 where the sigmas are right.
+    /// rms of the peaks' residuals over their stated sigmas: 1 if the sigmas are right.
     pub sigma_ratio: f64,
-    /// Neighbouring peaks share speckle: variance counts this often; 1 where they are independent.
+    /// Factor on the variance because neighbouring peaks share speckle; 1 if they are independent.
     pub neighbour_factor: f64,
-    /// How much farther the pictures' stripes lie from the plane than their own sigmas say; 1 where these are right.
+    /// Distance of the pictures' stripes from the plane relative to their own sigmas; 1 if these are right.
     pub scatter: f64,
-    /// What the variance was multiplied by for it.
+    /// Factor on the variance for this scatter.
     pub inflation: f64,
-    /// Another plane that the light left over agrees on.
+    /// Another plane that the peaks outside the fit agree on.
     pub second: Option<SecondPlane>,
     /// Largest angle between two boards' normals, rad.
     pub board_spread: f64,
     /// Least and largest depth of a used peak, mm.
     pub reach: [f64; 2],
-    /// Spread of the stripes across their own direction, mm (rms): what holds the plane's tilt.
+    /// rms spread of the stripes perpendicular to their own direction, mm; it determines the plane's tilt.
     pub depth_spread: f64,
     /// Whether the fit is a minimum.
     pub end: End,
 }
 
-/// The fit under way: what counts, where plane and boards are, and how far the stated sigmas are right.
+/// State of the fit: the used data, the plane and the boards, and the corrections of the stated sigmas.
 struct Fitting {
     data: Data,
     state: State,
@@ -103,13 +105,13 @@ struct Fitting {
     used: Vec<bool>,
     sigma_ratio: f64,
     neighbours: f64,
-    /// What the peaks' sigmas are multiplied by, as both of these say.
+    /// Factor on the peaks' sigmas, by both of these.
     factor: f64,
 }
 
-/// Fits the laser plane. `feature_factor` makes the stated sigmas of the boards' features true
-/// ([`crate::calibrate::measured_pose::pooled_factor`]),
-/// `camera_covariance` that of the camera's parameters.
+/// Fits the laser plane. `feature_factor` corrects the stated sigmas of the boards' features
+/// ([`crate::calibrate::measured_pose::pooled_factor`]). `camera_covariance` is the covariance of the camera's
+/// parameters.
 pub fn solve(
     views: &[StripeView],
     camera: &Intrinsics,
@@ -146,7 +148,7 @@ pub fn solve(
     let exact = &basis * &local * basis.transpose() * inflation;
     let follows = by_camera.plane * camera_covariance.matrix() * by_camera.plane.transpose();
     let covariance = &exact + &basis * DMatrix::from_column_slice(3, 3, follows.as_slice()) * basis.transpose();
-    // What lies in reach of this plane is its own light, displaced by an edge of the print or a hot pixel.
+    // Peaks near this plane are its own light, displaced by an edge of the print or a hot pixel.
     let rest = |p: &&Seen| uses[p.view][p.index] != PeakUse::Used && !near(p, &state.plane, &data.measured, o.gate_px);
     let rest: Vec<Seen> = all.iter().filter(rest).copied().collect();
     let second = second_plane(&rest, &data, &state, views, camera, o);
@@ -169,7 +171,7 @@ pub fn solve(
 }
 
 impl Fitting {
-    /// The plane that most peaks lie on, the boards where they were measured, and the pictures that agree.
+    /// Starts with the consensus plane of the peaks, the measured board poses and the pictures that agree.
     fn start(
         views: &[StripeView],
         all: &[Seen],
@@ -188,8 +190,8 @@ impl Fitting {
         Ok(Fitting { data, state, used, sigma_ratio: 1.0, neighbours: 1.0, factor: 1.0 })
     }
 
-    /// Least squares in rounds, until the sigmas stand still and no picture contradicts the others; of those that do,
-    /// the worst leaves each round.
+    /// Least squares in rounds, until the sigmas are stable and no picture contradicts the others. Each round
+    /// excludes the worst contradicting picture.
     fn settle(&mut self, all: &[Seen], o: &LaserPlaneOptions) -> Result<(Solution<State>, End)> {
         let mut solution = None;
         for round in 0..self.used.len() + 3 {
@@ -221,7 +223,7 @@ impl Fitting {
         self.used.iter().filter(|u| **u).count()
     }
 
-    /// Chooses the peaks by their distance from a robust fit, in sigmas as these turn out there.
+    /// Selects the peaks by their distance from a robust fit, in sigmas as estimated from that fit.
     fn gate_peaks(&mut self, all: &[Seen], o: &LaserPlaneOptions) -> Result<()> {
         self.state = self.data.solve(&self.state, Loss::Cauchy(2.4), self.factor).ok_or_else(undetermined)?.0.state;
         let scale = robust_ratio(&self.data, &self.state, self.factor).max(0.2);
@@ -230,7 +232,7 @@ impl Fitting {
         Ok(())
     }
 
-    /// The factor on the peaks' sigmas by what is left over; true where it stands still.
+    /// Sets the factor on the peaks' sigmas from the residuals; returns true when it is stable.
     fn judge_sigmas(&mut self) -> bool {
         let ratios: Vec<f64> = self.data.peaks.iter().map(|p| ratio(p, &self.state, 1.0)).collect();
         self.sigma_ratio = (ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64).sqrt();
@@ -246,7 +248,7 @@ fn undetermined() -> Fault {
     refused("the laser plane is not determined by these stripes".into())
 }
 
-/// What became of the peaks on the boards.
+/// Sets the use of each peak on the boards.
 fn mark(uses: &mut [Vec<PeakUse>], all: &[Seen], fitted: &[Seen], used: &[bool]) {
     for p in all {
         uses[p.view][p.index] = if used[p.view] { PeakUse::Disagrees } else { PeakUse::PictureLeftOut };
@@ -295,11 +297,11 @@ fn robust_ratio(data: &Data, s: &State, factor: f64) -> f64 {
     crate::solve::robust_scale(&mut r, 1)
 }
 
-/// Longest correlation along the stripe that is looked for, peaks.
+/// Largest lag of the correlation along the stripe, peaks.
 const LONGEST_LAG: usize = 40;
 
-/// 1 + 2 Σ ρₖ over the lags along the stripe whose correlation stands out of the noise: speckle, and broken pieces of a
-/// stripe that lie off it as a whole.
+/// 1 + 2 Σ ρₖ over the lags along the stripe whose correlation exceeds the noise. Speckle causes it, and so do pieces
+/// of a stripe that are displaced together.
 fn neighbour_factor(peaks: &[Seen], ratios: &[f64]) -> f64 {
     let variance = ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64;
     let apart = |a: &Seen, b: &Seen| (a.view == b.view).then(|| (b.pixel - a.pixel).norm());
@@ -348,7 +350,7 @@ fn residuals(
     (0..views.len())
         .map(|v| {
             let used_here: Vec<&Seen> = data.peaks.iter().filter(|p| p.view == v).collect();
-            // A picture that was left out is shown with the peaks that it would have brought.
+            // For an excluded picture, the peaks that it would have contributed.
             let shown: Vec<&Seen> =
                 if used[v] { used_here.clone() } else { all.iter().filter(|p| p.view == v).collect() };
             let (px, mm) = rms(&shown, &state.plane, &state.poses[v]);

@@ -1,5 +1,5 @@
-//! In: peaks and boards' poses at a state of the solve. Out: residuals, derivatives, and what each
-//! picture says about the plane with its board's pose eliminated.
+//! In: peaks and boards' poses at a state of the solve. Out: residuals, derivatives, and the information of each
+//! picture about the plane with its board's pose eliminated.
 //! Frame and unit: camera frame, mm; peaks in px (docs/math.md, Laser plane (1) to (5)).
 
 use super::views::{StripePeak, StripeView};
@@ -8,7 +8,7 @@ use crate::geometry::{Board, Camera, Plane, Rigid, Twist, Vec2, Vec3};
 use crate::solve::{End, LmOptions, Loss, Problem, Residuals, Solution, lm};
 use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix6, SMatrix};
 
-/// A peak as seen by the solver.
+/// A peak as the solver uses it.
 #[derive(Clone, Copy)]
 pub(in crate::calibrate) struct Seen {
     pub(in crate::calibrate) view: usize,
@@ -28,7 +28,7 @@ pub(in crate::calibrate) fn look(camera: &Intrinsics, view: usize, index: usize,
     Some(Seen { view, index, pixel: peak.pixel, ray: Vec3::new(n.x, n.y, 1.0), ray_by_pixel, sigma_px: peak.sigma_px })
 }
 
-/// Where a ray (x, y, 1) meets a board.
+/// Intersection of a ray (x, y, 1) with a board, camera frame, mm.
 pub(in crate::calibrate) fn on_board(pose: &Rigid<Camera, Board>, ray: &Vec3) -> Option<Vec3> {
     let normal: Vec3 = pose.rotation.column(2).into();
     let slope = normal.dot(ray);
@@ -36,7 +36,7 @@ pub(in crate::calibrate) fn on_board(pose: &Rigid<Camera, Board>, ray: &Vec3) ->
     (slope.abs() > 1e-6 && depth > 0.0).then(|| ray * depth)
 }
 
-/// Distance from the plane per pixel across the stripe, mm/px.
+/// Change of the distance from the plane per pixel across the stripe, mm/px.
 pub(in crate::calibrate) fn mm_per_px(plane: &Plane<Camera>, pose: &Rigid<Camera, Board>, s: &Seen) -> f64 {
     let normal: Vec3 = pose.rotation.column(2).into();
     let slope = normal.dot(&s.ray);
@@ -53,21 +53,21 @@ pub(in crate::calibrate) struct State {
 
 pub(in crate::calibrate) struct Fit<'a> {
     pub(in crate::calibrate) peaks: &'a [Seen],
-    /// mm of plane distance that one sigma of a peak makes.
+    /// Distance from the plane that corresponds to one sigma of a peak, mm.
     pub(in crate::calibrate) sigma_mm: Vec<f64>,
     pub(in crate::calibrate) measured: &'a [Rigid<Camera, Board>],
-    /// Upper Cholesky factors of the poses' information in units of their sigma.
+    /// Upper Cholesky factors of the poses' information matrices.
     pub(in crate::calibrate) roots: &'a [Matrix6<f64>],
 }
 
-/// Two directions in the plane.
+/// Two orthogonal unit vectors in the plane.
 pub(in crate::calibrate) fn tangents(normal: &Vec3) -> [Vec3; 2] {
     let axis = if normal.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
     let a = normal.cross(&axis).normalize();
     [a, normal.cross(&a)]
 }
 
-/// A peak's residual in sigmas and its derivatives by the plane's three numbers and the pose's six.
+/// A peak's residual in sigmas and its derivatives by the plane's three parameters and the pose's six.
 pub(in crate::calibrate) fn row(
     plane: &Plane<Camera>,
     pose: &Rigid<Camera, Board>,
@@ -113,7 +113,7 @@ impl Problem for Fit<'_> {
     }
 }
 
-/// The data of one solve: views as measured, chosen peaks.
+/// The data of one solve: the measured poses and the selected peaks.
 pub(in crate::calibrate) struct Data {
     pub(in crate::calibrate) peaks: Vec<Seen>,
     pub(in crate::calibrate) measured: Vec<Rigid<Camera, Board>>,
@@ -121,7 +121,7 @@ pub(in crate::calibrate) struct Data {
 }
 
 impl Data {
-    /// `None` where a sheet or board is where no peak can be.
+    /// `None` if the plane or a board cannot produce one of the peaks.
     pub(in crate::calibrate) fn solve(&self, start: &State, loss: Loss, factor: f64) -> Option<(Solution<State>, End)> {
         let fit = |state: &State| {
             let sigma_mm = self
@@ -130,16 +130,16 @@ impl Data {
                 .map(|s| s.sigma_px * factor * mm_per_px(&state.plane, &state.poses[s.view], s))
                 .collect();
             let fit = Fit { peaks: &self.peaks, sigma_mm, measured: &self.measured, roots: &self.roots };
-            // A cost that stands still to 1e-9 is 0.002 sigma from the bottom.
+            // A relative change of the cost of 1e-9 corresponds to 0.002 sigma from the minimum.
             let o = LmOptions { loss, estimate_scale: loss != Loss::Squares, tolerance: 1e-9, ..LmOptions::default() };
             lm(&fit, state.clone(), &o)
         };
-        // The scale from mm to px follows the plane: two rounds fix it.
+        // The scale from mm to px depends on the plane: two rounds settle it.
         fit(&fit(start).so_far()?.state).ended()
     }
 }
 
-/// Residual over `factor` times its sigma.
+/// Residual of a peak divided by `factor` times its sigma.
 pub(in crate::calibrate) fn ratio(p: &Seen, s: &State, factor: f64) -> f64 {
     let Some(x) = on_board(&s.poses[p.view], &p.ray) else { return f64::INFINITY };
     s.plane.distance(&x) / (mm_per_px(&s.plane, &s.poses[p.view], p) * p.sigma_px * factor)
@@ -156,25 +156,25 @@ pub(in crate::calibrate) fn basis(plane: &Plane<Camera>) -> DMatrix<f64> {
     j
 }
 
-/// What one picture says of the plane, its board's pose eliminated (docs/math.md, Laser plane (5)): a stripe on a
-/// flat board is a straight line and tells the plane's distance at its two ends.
+/// The information of one picture about the plane, its board's pose eliminated (docs/math.md, Laser plane (5)). A
+/// stripe on a flat board is a straight line and determines the plane's distance at its two ends.
 pub(in crate::calibrate) struct Says {
     /// d(distances at the stripe's ends)/d(two tilts, offset).
     pub(in crate::calibrate) by_plane: SMatrix<f64, 2, 3>,
-    /// On the two distances, 1/mm² and 1/mm.
+    /// Information matrix and gradient of the two distances, 1/mm² and 1/mm.
     pub(in crate::calibrate) information: Matrix2<f64>,
     pub(in crate::calibrate) gradient: Vec2,
 }
 
 impl Says {
-    /// The same on the plane's three numbers.
+    /// The same for the plane's three parameters.
     pub(in crate::calibrate) fn of_plane(&self) -> (Matrix3<f64>, Vec3) {
         let j = self.by_plane.transpose();
         (j * self.information * self.by_plane, j * self.gradient)
     }
 }
 
-/// `None` where fewer than two places of the board are lit.
+/// `None` if fewer than two positions of the board have peaks.
 pub(in crate::calibrate) fn says(data: &Data, state: &State, view: usize, factor: f64) -> Option<Says> {
     let (plane, pose) = (&state.plane, &state.poses[view]);
     let board: Vec3 = pose.rotation.column(2).into();
@@ -217,16 +217,16 @@ pub(in crate::calibrate) fn stepped(plane: &Plane<Camera>, step: &Vec3) -> Optio
     Plane::new((plane.normal + a * step.x + b * step.y).normalize(), plane.offset + step.z)
 }
 
-/// How a fit follows the camera's parameters ([`crate::camera::NAMES`]); none of those that are certain.
+/// Derivatives of a fit by the camera's parameters ([`crate::camera::NAMES`]); zero for parameters that are certain.
 pub(in crate::calibrate) struct ByCamera {
     /// Of the plane's two tilts and its offset.
     pub(in crate::calibrate) plane: SMatrix<f64, 3, PARAMETERS>,
-    /// Of each picture's gradient ([`Says::gradient`]) at the fitted plane; none for a picture without light.
+    /// Of each picture's gradient ([`Says::gradient`]) at the fitted plane; `None` for a picture without peaks.
     pub(in crate::calibrate) gradients: Vec<Option<SMatrix<f64, 2, PARAMETERS>>>,
 }
 
-/// Through the peaks' rays and the boards' poses, by the implicit function theorem; for the parameters that are
-/// uncertain.
+/// Derivatives by the uncertain parameters, through the peaks' rays and the boards' poses, by the implicit function
+/// theorem.
 pub(in crate::calibrate) fn by_camera(
     data: &Data,
     state: &State,

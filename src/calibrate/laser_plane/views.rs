@@ -1,28 +1,28 @@
-//! In: nothing. Out: a picture of the stripe on a board of measured pose, as the solve takes it.
+//! In: nothing. Out: the input type of the solve: a picture of the stripe on a board of measured pose.
 //! Frame and unit: camera frame, mm; peaks in px.
 
 use crate::calibrate::measured_pose::MeasuredPose;
 use crate::geometry::Vec2;
 use crate::recording::BoardSpec;
 
-/// One place where the stripe was found.
+/// One position at which the stripe was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StripePeak {
-    /// px.
+    /// Position in the picture, px.
     pub pixel: Vec2,
     /// Standard deviation across the stripe, px.
     pub sigma_px: f64,
-    /// Standard deviation of the stripe's own profile, px.
+    /// Standard deviation of the stripe's intensity profile, px.
     pub width_px: f64,
 }
 
 /// One board with the stripe on it.
 #[derive(Clone, Debug)]
 pub struct StripeView {
-    /// The board before the camera, as the picture measured it.
+    /// Pose of the board in the camera frame, as measured in the picture.
     pub pose: MeasuredPose,
-    /// How it is printed: peaks at its edges do not count.
+    /// Print of the board: peaks at its edges are not used.
     pub board: BoardSpec,
-    /// The stripe's peaks in the whole picture, on the board and beside it.
+    /// All stripe peaks of the picture, on the board and beside it.
     pub peaks: Vec<StripePeak>,
 }

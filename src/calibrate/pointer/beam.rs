@@ -1,4 +1,4 @@
-//! In: points in space, steps. Out: a beam as a line: through points of which some are wrong, after a step, its own
+//! In: points in space, steps. Out: a beam as a line: a robust fit through points, the beam after a step, its
 //! parameters.
 //! Frame and unit: camera frame, mm; directions have length one.
 
@@ -8,14 +8,14 @@ use nalgebra::DMatrix;
 /// Names of the beam's own six parameters; the camera's follow in the file.
 pub const BEAM_NAMES: [&str; 6] = ["ox_mm", "oy_mm", "oz_mm", "dx", "dy", "dz"];
 
-/// Two directions across the beam.
+/// Two unit vectors perpendicular to the beam and to each other.
 pub(in crate::calibrate) fn across(direction: &Vec3) -> [Vec3; 2] {
     let axis = if direction.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
     let a = direction.cross(&axis).normalize();
     [a, direction.cross(&a)]
 }
 
-/// A beam after a step: origin by two, direction by two, both across the beam.
+/// A beam after a step: two components for the origin, two for the direction, all perpendicular to the beam.
 pub fn moved_beam(beam: &Ray<Camera>, s: &[f64]) -> Ray<Camera> {
     let [a, b] = across(&beam.direction);
     Ray::new(beam.origin + a * s[0] + b * s[1], beam.direction + a * s[2] + b * s[3])
@@ -41,7 +41,7 @@ fn line(points: &[Vec3]) -> Option<Ray<Camera>> {
     Ray::new(c, if d.z < 0.0 { -d } else { d })
 }
 
-/// The line through two of the points that most others are near to, refined on those.
+/// The line through two of the points with the smallest median distance, refined on the points near it.
 pub(in crate::calibrate) fn robust_line(points: &[Vec3], gates: &[f64]) -> Option<Ray<Camera>> {
     let mut best: Option<(f64, Ray<Camera>)> = None;
     for (i, a) in points.iter().enumerate() {
@@ -63,7 +63,7 @@ fn off(ray: &Ray<Camera>, p: &Vec3) -> f64 {
     (p - ray.origin).cross(&ray.direction).norm()
 }
 
-/// Which points lie near a line, as the middle one of them does.
+/// Points near a line: within six times the median distance, or within their gate.
 pub(super) fn near_line(points: &[Vec3], gates: &[f64], ray: &Ray<Camera>) -> Vec<usize> {
     let d: Vec<f64> = points.iter().map(|p| off(ray, p)).collect();
     let mut sorted = d.clone();

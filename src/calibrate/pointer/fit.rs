@@ -1,5 +1,5 @@
-//! In: spots on boards, a beam to start from. Out: the beam of these spots by maximum likelihood, the boards' poses
-//! free within their own uncertainty; how far a spot lies from it, how it follows the camera.
+//! In: spots on boards, a start beam. Out: the beam of these spots by maximum likelihood, where the boards' poses may
+//! move within their own uncertainty; the distance of a spot from the beam; the derivatives by the camera.
 //! Frame and unit: camera frame, mm; spots in px (docs/math.md, Pointer (3) to (5)).
 
 use super::beam::moved_beam;
@@ -12,15 +12,15 @@ use nalgebra::{DMatrix, Matrix2, Matrix6, SMatrix};
 /// One board with the pointer's spot on it.
 #[derive(Clone, Debug)]
 pub struct SpotView {
-    /// The board before the camera, as the picture measured it.
+    /// Pose of the board in the camera frame, as measured in the picture.
     pub pose: MeasuredPose,
     /// The spot's centre, px.
     pub pixel: Vec2,
-    /// px².
+    /// Covariance of the spot's centre, px².
     pub covariance: Matrix2<f64>,
 }
 
-/// What is solved for.
+/// The unknowns.
 #[derive(Clone)]
 pub(super) struct State {
     pub(super) beam: Ray<Camera>,
@@ -30,17 +30,17 @@ pub(super) struct State {
 struct Fit<'a> {
     camera: &'a Intrinsics,
     views: &'a [&'a SpotView],
-    /// Boards' poses for this camera.
+    /// The boards' poses measured with this camera.
     measured: Vec<Rigid<Camera, Board>>,
     roots: Vec<Matrix6<f64>>,
     whiteners: Vec<Matrix2<f64>>,
 }
 
-/// Where the beam meets a board, and its pixel.
+/// The intersection of the beam with a board, and its pixel.
 pub(super) fn spot(camera: &Intrinsics, beam: &Ray<Camera>, pose: &Rigid<Camera, Board>) -> Option<(Vec3, Vec2)> {
     let normal: Vec3 = pose.rotation.column(2).into();
     let plane = Plane::<Camera>::new(normal, normal.dot(&pose.translation))?;
-    // Boards may lie on either side of the origin that the beam is given by.
+    // Boards may lie on either side of the beam's origin.
     let slope = plane.normal.dot(&beam.direction);
     let p = beam.at(-plane.distance(&beam.origin) / slope);
     (slope.abs() > 1e-6).then_some(())?;
@@ -69,7 +69,7 @@ impl Problem for Fit<'_> {
             let r = self.residual(&s.beam, &s.poses[i], i)?;
             let mut j = [0.0; 20];
             for c in 0..10 {
-                // Central differences: a spot's pixel is smooth on the scale of mm and mrad.
+                // Central differences: a spot's pixel is a smooth function of mm and mrad.
                 let h = if [0, 1, 4, 5, 6].contains(&c) { 1e-4 } else { 1e-6 };
                 let at = |sign: f64| {
                     let mut d = [0.0; 10];
@@ -92,7 +92,7 @@ impl Problem for Fit<'_> {
 /// Beam and poses, their covariance, the sum of squared residuals, and whether that is a minimum.
 pub(super) type Solved = (State, DMatrix<f64>, f64, End);
 
-/// `shift` is how far the camera is from the one that the boards were measured with.
+/// `shift`: difference between this camera's parameters and those that the boards were measured with.
 pub(super) fn fit(
     views: &[&SpotView],
     camera: &Intrinsics,
@@ -116,7 +116,7 @@ pub(super) fn fit(
     Some((found.state, found.covariance?, cost, end))
 }
 
-/// Of a spot from a beam, squared, over what is expected.
+/// Squared Mahalanobis distance of a spot from a beam. `used`: whether the beam was fitted to this spot.
 pub(super) fn distance2(view: &SpotView, camera: &Intrinsics, s: &Solved, used: bool, factor: f64) -> f64 {
     let (state, local, ..) = s;
     let pose = &view.pose.camera_from_board;
@@ -143,8 +143,8 @@ pub(super) fn distance2(view: &SpotView, camera: &Intrinsics, s: &Solved, used: 
     solve(total).or_else(|| solve(own)).unwrap_or(f64::INFINITY)
 }
 
-/// d(ox oy oz dx dy dz)/d(camera), by solving again with the camera a little different: the boards'
-/// poses follow the camera, too. For the parameters that are uncertain.
+/// d(ox oy oz dx dy dz)/d(camera) for the uncertain parameters, by repeated solves with a slightly changed camera.
+/// The boards' poses change with the camera, too.
 pub(super) fn by_camera(
     views: &[&SpotView],
     camera: &Intrinsics,
@@ -159,7 +159,7 @@ pub(super) fn by_camera(
             let mut d = Parameters::zeros();
             d[k] = sign * h;
             let beam = fit(views, &camera.changed(&d), &d, &state.beam, factor)?.0.beam;
-            // All beams are compared where they cross one plane, square to the first.
+            // All beams are compared where they cross one plane, perpendicular to the first beam.
             let s = (state.beam.origin - beam.origin).dot(&state.beam.direction)
                 / beam.direction.dot(&state.beam.direction);
             Some((beam.origin + beam.direction * s, beam.direction))

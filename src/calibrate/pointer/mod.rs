@@ -1,4 +1,5 @@
-//! In: the pointer's spots on boards of measured pose. Out: its beam with covariance and verdict; distances by it.
+//! In: the pointer's spots on boards of measured pose. Out: its beam with covariance and verdict; distances by that
+//! beam.
 //! Frame and unit: camera frame, mm; spots in px (docs/math.md, Pointer).
 
 pub mod beam;

@@ -1,31 +1,31 @@
-//! In: a picture with a spot, the places of bad pixels, and (on a board) the picture in room light. Out: the
-//! brightest place, cut out, with the shape at which a fit begins.
+//! In: a picture with a spot, the positions of bad pixels, and (on a board) the picture in room light. Out: the
+//! region around the brightest spot, and the start shape of the fit.
 //! Frame and unit: px, grey levels (docs/math.md, Pointer (1), (2)).
 
 use crate::fault::{Fault, Result};
 use crate::raster::Image;
 use std::ops::Range;
 
-/// One picture as the fit sees it.
+/// The part of a picture that the fit uses.
 pub(super) struct Patch {
     x0: usize,
     y0: usize,
     width: usize,
     pub grey: Vec<f64>,
-    /// Pixels that count.
+    /// Pixels that are used.
     good: Vec<bool>,
-    /// Reflectance relative to the brightest place near the spot.
+    /// Reflectance relative to the white of the print near the spot.
     pub reflectance: Vec<f64>,
     /// Full scale, and the noise around the spot, grey levels.
     pub full: f64,
     pub noise: f64,
 }
 
-/// u v, ln amplitude, ln width, two of shape, background.
+/// u v, ln amplitude, ln width, two shape parameters, background.
 pub(super) type Shape = [f64; 7];
 
-/// Value and derivatives of the spot's light by u v lnA lnS e1 e2 at an offset: an elliptical Gaussian
-/// whose inverse square root is exp(−lnS) times [[exp(e1), 0], [e2, exp(−e1)]].
+/// Value and derivatives of the spot's intensity by u v lnA lnS e1 e2 at an offset. The spot is an elliptical
+/// Gaussian whose inverse square root is exp(−lnS) times [[exp(e1), 0], [e2, exp(−e1)]].
 pub(super) fn profile(s: &Shape, dx: f64, dy: f64) -> (f64, [f64; 6]) {
     let (k, e) = ((-s[3]).exp(), s[4].exp());
     let p = k * e * dx;
@@ -48,7 +48,7 @@ impl Patch {
     pub fn model(&self, s: &Shape, i: usize, x: f64, y: f64) -> f64 {
         self.reflectance[i] * (s[6] + profile(s, x - s[0], y - s[1]).0)
     }
-    /// Speckle is multiplicative, so the faint flanks say as much about the centre as the peak does.
+    /// Speckle is multiplicative, so the faint flanks carry as much information about the centre as the peak.
     pub fn sigmas(&self, s: &Shape, speckle: f64) -> Vec<f64> {
         let mut out = vec![1.0; self.grey.len()];
         self.each(|i, x, y| {
@@ -57,13 +57,13 @@ impl Patch {
         });
         out
     }
-    /// What the picture in room light says of the print under the spot.
+    /// Sets the reflectance of the print under the spot from the picture in room light.
     fn lit_by(&mut self, ambient: &Image) {
         for (i, r) in self.reflectance.iter_mut().enumerate() {
             let (x, y) = (self.x0 + i % self.width, self.y0 + i / self.width);
             *r = f64::from(ambient.get(x as u32, y as u32));
         }
-        // The print's white: the third quartile of what the spot covers.
+        // White of the print: the third quartile of the window.
         let mut sorted = self.reflectance.clone();
         sorted.sort_by(f64::total_cmp);
         let white = sorted[sorted.len() * 3 / 4].max(1.0);
@@ -71,16 +71,16 @@ impl Patch {
     }
 }
 
-/// The brightest place of a picture.
+/// The brightest spot of a picture.
 pub(super) struct Brightest {
     pub patch: Patch,
-    /// Where the fit begins.
+    /// Start values of the fit.
     pub shape: Shape,
-    /// Light of the brightest other place over this one's.
+    /// Intensity of the brightest other spot relative to this one.
     pub rival: f64,
 }
 
-/// Finds the brightest spot and its first shape.
+/// Finds the brightest spot and the start values of its shape.
 pub(super) fn locate(laser: &Image, ambient: Option<&Image>, hot: &[bool], max_width_px: f64) -> Result<Brightest> {
     let (w, h) = (laser.width as usize, laser.height as usize);
     if w < 16 || h < 16 {
@@ -113,17 +113,17 @@ pub(super) fn locate(laser: &Image, ambient: Option<&Image>, hot: &[bool], max_w
 struct Picture<'a> {
     grey: Vec<f64>,
     full: f64,
-    /// See [`super::spot::hot_pixels`]; empty for none.
+    /// See [`super::spot::hot_pixels`]; empty if there are none.
     hot: &'a [bool],
     w: usize,
     h: usize,
 }
 
-/// Light of 5x5 pixels around each place.
+/// Intensity summed over the 5x5 pixels around each position.
 struct Blurred {
     light: Vec<f64>,
     w: usize,
-    /// The most of it, and where.
+    /// The largest value, and its position.
     best: f64,
     at: (usize, usize),
 }
@@ -133,13 +133,13 @@ impl Picture<'_> {
         !self.hot.get(k).copied().unwrap_or(false)
     }
 
-    /// Columns and rows within `reach` of a place.
+    /// Ranges of columns and rows within `reach` of a position.
     fn window(&self, (x, y): (usize, usize), reach: usize) -> (Range<usize>, Range<usize>) {
         let (x1, y1) = ((x + reach + 1).min(self.w), (y + reach + 1).min(self.h));
         (x.saturating_sub(reach)..x1, y.saturating_sub(reach)..y1)
     }
 
-    /// The bad pixels and the brightest of each 5x5 are left out: no single pixel wins.
+    /// The bad pixels and the brightest pixel of each 5x5 are excluded, so that no single pixel can win.
     fn blurred(&self) -> Blurred {
         let (w, h) = (self.w, self.h);
         let mut out = Blurred { light: vec![0.0; w * h], w, best: 0.0, at: (0, 0) };
@@ -166,7 +166,7 @@ impl Picture<'_> {
         out
     }
 
-    /// Median and noise of a ring around the spot.
+    /// Median and noise of a ring around the spot, grey levels.
     fn surroundings(&self, (x, y): (usize, usize)) -> (f64, f64) {
         let mut ring = Vec::new();
         let (columns, rows) = self.window((x, y), 24);
@@ -180,11 +180,11 @@ impl Picture<'_> {
         ring.sort_by(f64::total_cmp);
         let median = ring[ring.len() / 2];
         let mut off: Vec<f64> = ring.iter().map(|g| (g - median).abs()).collect();
-        // Grey levels are whole numbers: their rounding alone has a sigma of 0.29.
+        // Grey levels are integers: rounding alone has a sigma of 0.29.
         (median, crate::solve::robust_scale(&mut off, 1).max(0.29).hypot(0.29))
     }
 
-    /// The brightest good pixel of the spot over the background, grey levels.
+    /// Intensity of the spot's brightest good pixel above the background, grey levels.
     fn peak(&self, at: (usize, usize), background: f64) -> f64 {
         let (columns, rows) = self.window(at, 2);
         let mut peak = 0.0f64;
@@ -196,7 +196,7 @@ impl Picture<'_> {
         peak
     }
 
-    /// The first width, by the area above half of the peak: π 2 ln 2 s² for a Gaussian.
+    /// Start value of the width, from the area above half of the peak: 2 π ln 2 s² for a Gaussian.
     fn width(&self, at: (usize, usize), background: f64, peak: f64, most: f64) -> f64 {
         let (columns, rows) = self.window(at, (most * 2.0).ceil() as usize);
         let lit = |&k: &usize| self.grey[k] - background > 0.5 * peak && self.good(k);
@@ -204,7 +204,7 @@ impl Picture<'_> {
         (area as f64 / (std::f64::consts::TAU * std::f64::consts::LN_2)).sqrt().clamp(0.7, most)
     }
 
-    /// The window around the spot, as on a surface of one grey.
+    /// The window around the spot, with the same reflectance everywhere.
     fn cut(&self, at: (usize, usize), half: usize, noise: f64) -> Patch {
         let (columns, rows) = self.window(at, half);
         let row = |y: usize| columns.clone().map(move |x| y * self.w + x);
@@ -223,7 +223,7 @@ impl Picture<'_> {
 }
 
 impl Blurred {
-    /// Light of the brightest place outside `reach` px of the spot, above the background.
+    /// Intensity of the brightest position more than `reach` px from the spot, above the background.
     fn rival(&self, reach: f64, background: f64) -> f64 {
         let mut best = 0.0f64;
         for (k, light) in self.light.iter().enumerate() {

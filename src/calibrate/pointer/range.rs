@@ -1,5 +1,5 @@
-//! In: a spot's centre, the camera, the beam and their joint covariance. Out: distance and point with
-//! their sigmas; from three or more points the surface's normal and a tool pose square to it.
+//! In: a spot's centre, the camera, the beam and their joint covariance. Out: distance and point with their sigmas;
+//! from three or more points the surface's normal and a tool pose perpendicular to it.
 //! Frame and unit: camera and base frame, mm, rad (docs/math.md, Pointer (6) to (9); the paper's eq. 3, 4).
 
 use super::beam::BEAM_NAMES;
@@ -8,18 +8,18 @@ use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Flange, Mat3, Ray, Rigid, Tool, Vec2, Vec3, fit_plane, skew};
 use nalgebra::{Matrix2, SMatrix, SVector};
 
-/// What a point is computed from: the beam's six numbers and the camera's.
+/// Number of parameters that a point is computed from: the beam's six and the camera's.
 pub const RIG: usize = 6 + PARAMETERS;
-/// The same and the six of the hand-eye transform.
+/// The same plus the six of the hand-eye transform.
 pub const SHARED: usize = RIG + 6;
-/// Derivatives of a point by what it was computed from.
+/// Derivatives of a point by the parameters that it was computed from.
 pub type ByRig = SMatrix<f64, 3, RIG>;
-/// Rows and columns: the beam's ox oy oz (mm) dx dy dz, then the camera's ([`NAMES`]).
+/// Covariance; rows and columns: the beam's ox oy oz (mm) dx dy dz, then the camera's ([`NAMES`]).
 pub type RigCovariance = SMatrix<f64, RIG, RIG>;
-/// The same, then the hand-eye transform's tx ty tz (mm) rx ry rz (rad).
+/// The same, followed by the hand-eye transform's tx ty tz (mm) rx ry rz (rad).
 pub type SharedCovariance = SMatrix<f64, SHARED, SHARED>;
 
-/// A point that the pointer touched.
+/// A point measured with the pointer.
 #[derive(Clone, Debug)]
 pub struct Ranged {
     /// Distance from the beam's origin along the beam, mm.
@@ -30,22 +30,22 @@ pub struct Ranged {
     pub along_axis: f64,
     /// Its standard deviation, mm.
     pub along_axis_sigma: f64,
-    /// Camera frame, mm.
+    /// Position, camera frame, mm.
     pub point: Vec3,
-    /// mm²; spot, beam and camera together.
+    /// Total covariance by spot, beam and camera, mm².
     pub covariance: Mat3,
-    /// The part that belongs to this spot alone.
+    /// The part of the covariance that comes from this spot alone, mm².
     pub covariance_spot: Mat3,
-    /// How the point follows the beam and the camera, which all points share.
+    /// Derivatives of the point by the parameters of beam and camera, which all points share.
     pub by_rig: ByRig,
-    /// Distance of the spot from the beam's image, px, and in sigmas.
+    /// Distance of the spot from the beam's image, px.
     pub off_beam_px: f64,
     /// Distance of the spot from the beam's image, in sigmas.
     pub off_beam_sigmas: f64,
 }
 
-/// The beam's point whose pixel is nearest to the spot's, in units of the spot's sigma: the viewing
-/// ray and the beam meet only up to noise. `joint` is that of [`joint_covariance`].
+/// The point of the beam whose pixel is closest to the spot's, in units of the spot's sigma: the viewing ray and the
+/// beam meet only up to noise. `joint` comes from [`joint_covariance`].
 pub fn range(
     pixel: &Vec2,
     covariance: &Matrix2<f64>,
@@ -62,7 +62,7 @@ pub fn range(
         Fault::input(format!("the spot's covariance {covariance} is invalid")).next("measure the spot again")
     })?;
     let s = nearest(pixel, &whitener, camera, beam).ok_or_else(lost)?;
-    // Derivatives of the solution by everything it depends on, by differences of the solution itself.
+    // Derivatives of the solution by all its inputs, by differences of the solution.
     let at = |p: &Vec2, d: &SVector<f64, RIG>| -> Option<(f64, Vec3)> {
         let camera = camera.changed(&d.fixed_rows::<PARAMETERS>(6).into_owned());
         let beam = Ray::new(beam.origin + Vec3::new(d[0], d[1], d[2]), beam.direction + Vec3::new(d[3], d[4], d[5]))?;
@@ -113,7 +113,7 @@ fn stack((s, p): &(f64, Vec3)) -> SVector<f64, 4> {
 
 /// Gauss-Newton along the beam from the closed-form triangulation.
 fn nearest(pixel: &Vec2, whitener: &Matrix2<f64>, camera: &Intrinsics, beam: &Ray<Camera>) -> Option<f64> {
-    // Nearest approach of viewing ray and beam in space.
+    // Closest approach of viewing ray and beam in space.
     let v = camera.ray_from_pixel(pixel)?.direction;
     let (d, o) = (beam.direction, beam.origin);
     let (b, c, e) = (d.dot(&v), d.dot(&o), v.dot(&o));
@@ -135,22 +135,22 @@ fn nearest(pixel: &Vec2, whitener: &Matrix2<f64>, camera: &Intrinsics, beam: &Ra
     (beam.at(s).z > 0.0).then_some(s)
 }
 
-/// A ranged point in the base frame, its shared parts kept apart.
+/// A measured point in the base frame, with the uncertainty that it shares with other points kept separate.
 #[derive(Clone, Debug)]
 pub struct BasePoint {
-    /// Base frame, mm.
+    /// Position, base frame, mm.
     pub point: Vec3,
-    /// mm²; everything.
+    /// Total covariance, mm².
     pub covariance: Mat3,
-    /// The part of this shot alone: spot and robot.
+    /// The part that comes from this measurement alone, by spot and robot, mm².
     pub own: Mat3,
-    /// How it follows beam, camera and hand-eye, which all points share.
+    /// Derivatives by the parameters of beam, camera and hand-eye, which all points share.
     pub shared: SMatrix<f64, 3, SHARED>,
-    /// Where the camera was: the side of the surface that is outside.
+    /// Position of the camera; it shows which side of the surface is outside.
     pub camera: Vec3,
 }
 
-/// The robot's noise per axis that an error budget takes over from the hand-eye calibration.
+/// The robot's noise per axis, which an error budget takes from the hand-eye calibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RobotNoise {
     /// Position, 1 sigma per axis, mm.
@@ -189,37 +189,37 @@ pub fn to_base(
     }
 }
 
-/// A surface through ranged points.
+/// A plane through measured points.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    /// Of unit length, towards the camera; base frame.
+    /// Normal of unit length, towards the camera; base frame.
     pub normal: Vec3,
     /// Mean of the points, mm.
     pub centre: Vec3,
-    /// Uncertainty of the normal's direction: the ellipse's axes, rad, larger first.
+    /// Uncertainty of the normal's direction: the axes of the error ellipse, rad, the larger one first.
     pub tilt_sigma: [f64; 2],
     /// Uncertainty of the height at the centre, mm.
     pub height_sigma: f64,
     /// rms distance of the points from the plane, mm; 0 for three points.
     pub rms: f64,
-    /// The tool square to the surface: z out of the surface, x along the flange's x as far as that
-    /// is possible, origin at the centre.
+    /// The tool perpendicular to the surface: z out of the surface, x along the flange's x as far as possible, origin
+    /// at the centre.
     pub base_from_tool: Rigid<Base, Tool>,
-    /// Squared distances from the plane over what the points' own noise makes expect; 0 for three points.
+    /// Squared distances from the plane relative to those that the points' own noise explains; 0 for three points.
     pub misfit: f64,
-    /// The point that did not lie on the plane of the others and was left out.
+    /// Index of the point that was excluded because it did not lie on the plane of the others.
     pub left_out: Option<usize>,
 }
 
-/// The plane through three or more points, weighted by their own noise, with the uncertainty that
-/// they share propagated on top. `x` is the direction wanted for the tool's x axis (base frame).
+/// The plane through three or more points, weighted by their own noise; the uncertainty that they share is propagated
+/// and added. `x`: requested direction of the tool's x axis (base frame).
 pub fn surface(points: &[BasePoint], shared: &SharedCovariance, x: &Vec3) -> Result<Surface> {
     let whole = plane_of(points, shared, x)?;
     let freedom = points.len() as f64 - 3.0;
     if points.len() < 5 || whole.misfit * freedom < GROSS {
         return Ok(whole);
     }
-    // One spot over an edge or on another surface spoils the normal; four others must agree without it.
+    // One spot across an edge or on another surface spoils the normal. At least four others must agree without it.
     let without = |i: usize| {
         let others: Vec<BasePoint> =
             points.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, p)| p.clone()).collect();
@@ -228,11 +228,11 @@ pub fn surface(points: &[BasePoint], shared: &SharedCovariance, x: &Vec3) -> Res
     let explains =
         |b: &Surface| whole.misfit * freedom - b.misfit * (freedom - 1.0) >= GROSS && b.misfit <= even(freedom - 1.0);
     let mut found = (0..points.len()).filter_map(without).filter(explains);
-    // Where leaving out any of several would do, which of them is wrong cannot be told: the sigma says so.
+    // If the exclusion of any of several points would do, the wrong one is unknown; the sigma then covers it.
     Ok(found.next().filter(|_| found.next().is_none()).unwrap_or(whole))
 }
 
-/// A spot is left out where the sum of squared distances falls by this without it: five sigmas.
+/// A spot is excluded if the sum of squared distances falls by at least this without it: five sigmas.
 const GROSS: f64 = 25.0;
 
 /// Misfit up to which points count as lying on a plane: three sigmas above 1.
@@ -246,17 +246,17 @@ fn weak(what: String) -> Fault {
         .next("touch three places of the surface that are as far apart as the part allows")
 }
 
-/// A plane through the points' middle.
+/// A plane through the points' mean.
 struct Leaning {
     normal: Vec3,
-    /// Of tilt along two directions in the plane, and height.
+    /// Covariance of the slopes along two directions in the plane, and of the height.
     covariance: Mat3,
-    /// Heights of the points over it, mm.
+    /// Distances of the points from it, mm.
     residuals: Vec<f64>,
     misfit: f64,
 }
 
-/// Least squares of the points' heights over the plane square to `normal`.
+/// Least squares of the points' heights over the plane perpendicular to `normal`.
 fn lean(points: &[BasePoint], centre: &Vec3, normal: &Vec3, shared: &SharedCovariance) -> Result<Leaning> {
     let n = points.len();
     let axis = if normal.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
@@ -275,7 +275,7 @@ fn lean(points: &[BasePoint], centre: &Vec3, normal: &Vec3, shared: &SharedCovar
     let inverse = h.try_inverse().ok_or_else(|| weak("the points lie on a line".into()))?;
     let s = inverse * g;
     let residuals: Vec<f64> = (0..n).map(|i| (points[i].point - centre).dot(normal) - rows[i].dot(&s)).collect();
-    // Of the three numbers with respect to the shared parameters.
+    // Derivatives of the three numbers by the shared parameters.
     let mut j = SMatrix::<f64, 3, SHARED>::zeros();
     for i in 0..n {
         j += rows[i] * weights[i] * (normal.transpose() * points[i].shared);
@@ -286,7 +286,7 @@ fn lean(points: &[BasePoint], centre: &Vec3, normal: &Vec3, shared: &SharedCovar
     if freedom > 0.0 {
         misfit = residuals.iter().zip(&weights).map(|(r, w)| r * r * w).sum::<f64>() / freedom;
     }
-    // A surface that is not as flat as the spots are good has a normal that is not as good either.
+    // The normal of an uneven surface is less certain than the noise of the spots alone implies.
     let uneven = if freedom > 0.0 && misfit > even(freedom) { misfit } else { 1.0 };
     let covariance = inverse * uneven + j * shared * j.transpose();
     let normal = (normal - a * s.x - b * s.y).normalize();
@@ -329,8 +329,8 @@ fn plane_of(points: &[BasePoint], shared: &SharedCovariance, x: &Vec3) -> Result
     })
 }
 
-/// The joint covariance of beam and camera from a pointer's calibration file. A file that knows only
-/// the beam (imported values) counts the camera's part as nothing.
+/// The joint covariance of beam and camera from a pointer's calibration file. If the file states only the beam's
+/// covariance (imported values), the camera's part is zero.
 pub fn joint_covariance(covariance: &crate::rig::Covariance) -> RigCovariance {
     covariance.of::<RIG>(std::array::from_fn(|i| if i < 6 { BEAM_NAMES[i] } else { NAMES[i - 6] }))
 }

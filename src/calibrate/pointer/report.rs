@@ -1,5 +1,5 @@
-//! In: a pointer fit. Out: the verdict with reasons, figures and the next best picture, and the page a
-//! person reads; fit and verification apart.
+//! In: the fit of a pointer. Out: the verdict with reasons, figures and the next best picture, and the report page;
+//! fit and verification are separate.
 //! Frame and unit: camera frame; mm, degrees, px.
 
 use super::beam::BEAM_NAMES;
@@ -13,10 +13,10 @@ use crate::rig::{Covariance, Quality, Verdict, Volume};
 use nalgebra::Matrix2;
 use std::collections::BTreeMap;
 
-/// Scatter over the stated sigmas from which on spots are not good, and overrule no other.
+/// From this scatter relative to the stated sigmas on, the spots are not good and cannot overrule another.
 const LOUD: f64 = 3.0;
 
-/// Of the beam and the camera it was found with, under the names that the pointer's file has.
+/// Covariance of the beam and the camera it was fitted with, under the names of the pointer's file.
 pub fn covariance(fit: &PointerFit) -> Covariance {
     let camera: ParameterMatrix = fit.covariance.fixed_view::<PARAMETERS, PARAMETERS>(6, 6).into();
     let kept: Vec<usize> = (0..6).chain(named(&camera).into_iter().map(|i| 6 + i)).collect();
@@ -33,7 +33,7 @@ pub fn expected_error(fit: &PointerFit, camera: &Intrinsics, depth: f64, spot_px
     Some(range(&pixel, &spot, camera, &fit.beam, &joint).ok()?.along_axis_sigma)
 }
 
-/// Judges a fit. `spot_px` is the usual sigma of a spot's centre.
+/// Judges a fit. `spot_px`: usual sigma of a spot's centre, px.
 pub fn judge(fit: &PointerFit, camera: &Intrinsics, spot_px: f64, limits: &Limits) -> Quality {
     let work = &limits.working;
     let (near, far) = (work.near_mm, work.far_mm);
@@ -84,7 +84,7 @@ pub fn judge(fit: &PointerFit, camera: &Intrinsics, spot_px: f64, limits: &Limit
     }
 }
 
-/// What the spots allow: how many there are, how far apart, and which of them contradict the others.
+/// Judges the number of spots, their spread, and the spots that contradict the others.
 fn by_spots(fit: &PointerFit, used: &[&SpotResidual], work: &Volume, j: &mut Judgement) {
     j.at_best(Verdict::Usable, used.len() < 6, || format!("{} spots, 6 are needed to be good", used.len()));
     j.at_best(Verdict::BadlyDetermined, used.len() < 4, || format!("{} spots leave nothing to check", used.len()));
@@ -118,7 +118,7 @@ fn by_spots(fit: &PointerFit, used: &[&SpotResidual], work: &Volume, j: &mut Jud
     }
 }
 
-/// The fit in numbers; `expected` are the errors at the working distance and at the far end.
+/// The fit in numbers. `expected`: the errors at the working distance and at the far end, mm.
 fn figures(
     fit: &PointerFit,
     used: &[&SpotResidual],
@@ -148,7 +148,7 @@ fn figures(
     ])
 }
 
-/// The report.
+/// The report page.
 pub fn page(fit: &PointerFit, quality: &Quality) -> Page {
     let mut page = Page::new("Pointer calibration");
     page.verdict(quality);

@@ -1,5 +1,5 @@
-//! In: spots of the pointer on boards of measured pose. Out: the beam as a line in the camera frame
-//! by maximum likelihood, wrong spots left out and named.
+//! In: spots of the pointer on boards of measured pose. Out: the beam as a line in the camera frame by maximum
+//! likelihood; wrong spots are excluded and named.
 //! Frame and unit: camera frame, mm; spots in px (docs/math.md, Pointer (3) to (5)).
 
 use super::beam::{basis, near_line, robust_line};
@@ -15,14 +15,15 @@ use nalgebra::DMatrix;
 /// Settings of [`solve`].
 #[derive(Clone, Debug)]
 pub struct PointerOptions {
-    /// A spot is wrong where its squared Mahalanobis distance (2 degrees of freedom), over what is usual among the
-    /// others, exceeds this; 9..=1000.
+    /// A spot counts as wrong if its squared Mahalanobis distance (2 degrees of freedom), relative to the usual one
+    /// of the others, exceeds this; 9..=1000.
     pub gate: f64,
-    /// Spots nearer than this to the first line, in what a pixel covers there, are never left out of it; 0.5..=50.
+    /// Spots closer than this to the first line are never excluded from it, in footprints of a pixel at the spot;
+    /// 0.5..=50.
     pub gate_px: f64,
-    /// Fewest spots; 3..=1000.
+    /// Smallest number of spots; 3..=1000.
     pub min_spots: usize,
-    /// Spots must be spread along the beam at least this share of their distance; 0.01..=1.
+    /// Smallest spread of the spots along the optical axis, as a share of the largest depth; 0.01..=1.
     pub min_spread: f64,
 }
 
@@ -33,7 +34,7 @@ impl Default for PointerOptions {
 }
 
 impl PointerOptions {
-    /// Refuses values out of the ranges that the fields state.
+    /// Refuses values outside the ranges stated at the fields.
     pub fn check(&self) -> Result<()> {
         let ranges = [
             ("gate", self.gate, 9.0, 1000.0),
@@ -51,26 +52,26 @@ impl PointerOptions {
     }
 }
 
-/// How one spot fits.
+/// Residuals of one spot.
 #[derive(Clone, Debug)]
 pub struct SpotResidual {
-    /// Of the picture.
+    /// Name of the picture.
     pub name: String,
-    /// In the fit; false: it disagreed and was left out.
+    /// True if the spot is in the fit; false if it disagreed and was excluded.
     pub used: bool,
     /// Distance along the optical axis, mm.
     pub depth: f64,
-    /// Distance of the spot from where the beam meets the board, px.
+    /// Distance of the spot from the pixel where the beam meets the board, px.
     pub px: f64,
-    /// The same on the board, mm.
+    /// The same distance on the board, mm.
     pub mm: f64,
-    /// `px` with the spot left out of the fit; infinite where the others determine nothing.
+    /// `px` with the spot excluded from the fit; infinite if the others determine no beam.
     pub holdout_px: f64,
-    /// `mm` with the spot left out of the fit; infinite where the others determine nothing.
+    /// `mm` with the spot excluded from the fit; infinite if the others determine no beam.
     pub holdout_mm: f64,
     /// Squared Mahalanobis distance, 2 degrees of freedom.
     pub distance2: f64,
-    /// The same over what is usual among these spots, where that is more than chance.
+    /// The same divided by its usual size among these spots, if that is larger than chance explains.
     pub beside: f64,
 }
 
@@ -79,19 +80,18 @@ pub struct SpotResidual {
 pub struct PointerFit {
     /// The beam, mm.
     pub beam: Ray<Camera>,
-    /// ox oy oz (mm) dx dy dz, then the camera's ([`crate::camera::NAMES`]). The beam was found with this
-    /// camera, so their errors belong together.
+    /// Covariance of ox oy oz (mm) dx dy dz, then of the camera's parameters ([`crate::camera::NAMES`]). The beam was
+    /// fitted with this camera, so their errors are correlated.
     pub covariance: DMatrix<f64>,
-    /// The beam's 6x6 with the camera taken as exact.
+    /// The 6x6 covariance of the beam with the camera taken as exact.
     pub covariance_camera_exact: DMatrix<f64>,
-    /// One a view, in the order given.
+    /// One entry per view, in the order given.
     pub spots: Vec<SpotResidual>,
-    /// sqrt of chi² over its degrees of freedom.
+    /// Square root of chi² over its degrees of freedom.
     pub sigma_ratio: f64,
-    /// Nearest and farthest spot along the optical axis, mm.
+    /// Nearest and farthest used spot along the optical axis, mm.
     pub reach: [f64; 2],
-    /// A spot that was left out and one that was not, where the beam through the others goes as well through the one
-    /// as through the other.
+    /// An excluded spot and a used one that could be exchanged: the beam through the others fits either equally well.
     pub rivals: Option<[String; 2]>,
     /// Whether the fit is a minimum.
     pub end: End,
@@ -103,11 +103,11 @@ fn refused(what: String) -> Fault {
         .next("show the board to the pointer at four or more distances over the whole range that will be used")
 }
 
-/// The spots, where their viewing rays meet their boards, and a line through those to start from.
+/// The spots, the intersections of their viewing rays with their boards, and a start line through those.
 struct Spots<'a> {
     views: &'a [SpotView],
     camera: &'a Intrinsics,
-    /// Makes the stated sigmas of the boards' features true.
+    /// Corrects the stated sigmas of the boards' features.
     factor: f64,
     points: Vec<Vec3>,
     start: Ray<Camera>,
@@ -116,8 +116,8 @@ struct Spots<'a> {
 /// A beam through some of the spots.
 struct Judged {
     solved: Solved,
-    /// Of every spot, squared and over what is expected, from this beam; and from the beam of the others where it was
-    /// used.
+    /// Squared Mahalanobis distance of every spot from this beam; a used spot's own influence on the beam is taken
+    /// into account.
     distances: Vec<f64>,
     beside: Vec<f64>,
 }
@@ -126,7 +126,7 @@ fn undetermined() -> Fault {
     refused("the beam is not determined by these spots".into())
 }
 
-/// Where each viewing ray meets its board, mm.
+/// Intersection of each viewing ray with its board, mm.
 fn on_boards(views: &[SpotView], camera: &Intrinsics) -> Option<Vec<Vec3>> {
     let met = |v: &SpotView| {
         let normal: Vec3 = v.pose.camera_from_board.rotation.column(2).into();
@@ -150,7 +150,7 @@ impl Spots<'_> {
         Ok(Judged { solved, distances, beside })
     }
 
-    /// Those that lie on one line: from `used` on, wrong ones leave and right ones come back.
+    /// Spots that lie on one line: starting from `used`, wrong ones leave and right ones return.
     fn agreeing(&self, mut used: Vec<usize>, o: &PointerOptions) -> Result<Vec<usize>> {
         let all = self.views.len();
         for _ in 0..2 * all {
@@ -158,7 +158,8 @@ impl Spots<'_> {
                 return Err(refused(format!("only {} of {all} spots lie on one line", used.len())));
             }
             let Judged { distances, beside, .. } = self.fit_to(&used)?;
-            // One at a time, judged by the beam of the others: a wrong spot pulls its neighbours out with it.
+            // Exclude one spot per round, judged by the beam of the others: a wrong spot also pulls its neighbours
+            // off the line.
             let worst = used.iter().copied().max_by(|a, b| distances[*a].total_cmp(&distances[*b])).expect("not empty");
             if distances[worst] > o.gate && used.len() > o.min_spots {
                 let rest: Vec<usize> = used.iter().copied().filter(|&i| i != worst).collect();
@@ -176,7 +177,7 @@ impl Spots<'_> {
         Ok(used)
     }
 
-    /// A spot outside and one inside these that could change places: then it is not known which of them is wrong.
+    /// A spot outside and one inside the fit that could be exchanged: it is then not known which of them is wrong.
     fn rivals(&self, used: &[usize], cost: f64, scatter2: f64, o: &PointerOptions) -> Option<[String; 2]> {
         let outside = (0..self.views.len()).filter(|i| !used.contains(i));
         let name = |i: usize| self.views[i].pose.name.clone();
@@ -187,7 +188,7 @@ impl Spots<'_> {
         })
     }
 
-    /// Nearest and farthest of these, mm.
+    /// Smallest and largest depth of these spots, mm.
     fn reach(&self, used: &[usize], o: &PointerOptions) -> Result<[f64; 2]> {
         let along: Vec<f64> = used.iter().map(|&i| self.points[i].z).collect();
         let reach = [along.iter().copied().fold(f64::INFINITY, f64::min), along.iter().copied().fold(0.0, f64::max)];
@@ -203,14 +204,14 @@ impl Spots<'_> {
         Ok(reach)
     }
 
-    /// How far a spot's pixel and its place on the board lie from a beam's, px and mm.
+    /// Distances of a spot's pixel and of its position on the board from a beam, px and mm.
     fn gap(&self, i: usize, beam: &Ray<Camera>) -> (f64, f64) {
         let view = &self.views[i];
         spot(self.camera, beam, &view.pose.camera_from_board)
             .map_or((f64::INFINITY, f64::INFINITY), |(p, q)| ((q - view.pixel).norm(), (p - self.points[i]).norm()))
     }
 
-    /// One a view: from the beam, and from that of the others.
+    /// One entry per view: residuals from the beam, and from the beam of the others.
     fn residuals(&self, used: &[usize], judged: &Judged) -> Vec<SpotResidual> {
         let beam = &judged.solved.0.beam;
         let one = |i: usize| {
@@ -234,7 +235,8 @@ impl Spots<'_> {
     }
 }
 
-/// Of the beam and the camera together, from the beam's own covariance and its derivatives by the camera's parameters.
+/// Joint covariance of the beam and the camera, from the beam's own covariance and its derivatives by the camera's
+/// parameters.
 fn with_camera(exact: &DMatrix<f64>, by_camera: &DMatrix<f64>, camera: &CameraCovariance) -> DMatrix<f64> {
     let c = DMatrix::from_column_slice(PARAMETERS, PARAMETERS, camera.matrix().as_slice());
     let mut out = DMatrix::zeros(6 + PARAMETERS, 6 + PARAMETERS);
@@ -245,8 +247,9 @@ fn with_camera(exact: &DMatrix<f64>, by_camera: &DMatrix<f64>, camera: &CameraCo
     out
 }
 
-/// Fits the beam. `feature_factor` makes the stated sigmas of the boards' features true
-/// ([`crate::calibrate::measured_pose::pooled_factor`]), `camera_covariance` is that of the camera's parameters.
+/// Fits the beam. `feature_factor` corrects the stated sigmas of the boards' features
+/// ([`crate::calibrate::measured_pose::pooled_factor`]). `camera_covariance` is the covariance of the camera's
+/// parameters.
 pub fn solve(
     views: &[SpotView],
     camera: &Intrinsics,
@@ -260,10 +263,10 @@ pub fn solve(
     }
     let points =
         on_boards(views, camera).ok_or_else(|| refused("a spot's viewing ray does not meet its board".into()))?;
-    // What a pixel covers at each spot, mm.
+    // Gate at each spot, `gate_px` times the footprint of a pixel, mm.
     let pixel_mm: Vec<f64> = points.iter().map(|p| o.gate_px * p.z / camera.fx.min(camera.fy)).collect();
     let start = robust_line(&points, &pixel_mm).ok_or_else(|| refused("the spots are all in one place".into()))?;
-    // Total least squares in space weighs far spots wrongly; the fit in pixels starts from it.
+    // Total least squares in space weights distant spots wrongly; the fit in pixels starts from it.
     let near = near_line(&points, &pixel_mm, &start);
     let spots = Spots { views, camera, factor: feature_factor, points, start };
     let used = spots.agreeing(near, o)?;

@@ -1,5 +1,5 @@
-//! In: a picture of a laser pointer's spot, the places of bad pixels, and (on a board) the picture in
-//! room light. Out: the spot's centre with covariance.
+//! In: a picture of a laser pointer's spot, the positions of bad pixels, and (on a board) the picture in room light.
+//! Out: the spot's centre with covariance.
 //! Frame and unit: px, grey levels (docs/math.md, Pointer (1), (2)).
 
 use super::patch::{Brightest, Patch, Shape, locate, profile};
@@ -14,13 +14,13 @@ use nalgebra::Matrix2;
 pub struct SpotOptions {
     /// Contrast of the laser's speckle per pixel; `None`: estimated from all spots together. 0.005..=1.
     pub speckle: Option<f64>,
-    /// A spot's peak must rise this many noise sigmas over its surroundings; 4..=100.
+    /// Smallest height of a spot's peak above its surroundings, in noise sigmas; 4..=100.
     pub min_snr: f64,
-    /// Smallest sigma of a spot's profile, px: anything sharper than the lens is a bad pixel; 0.2..=5.
+    /// Smallest sigma of a spot's profile, px; anything sharper than the lens is a bad pixel; 0.2..=5.
     pub min_width_px: f64,
     /// Largest sigma of a spot's profile, px; 1..=200.
     pub max_width_px: f64,
-    /// A second spot with this share of the first one's light makes the choice ambiguous; 0.05..=1.
+    /// A second spot with this share of the first one's intensity makes the choice ambiguous; 0.05..=1.
     pub rival: f64,
 }
 
@@ -31,7 +31,7 @@ impl Default for SpotOptions {
 }
 
 impl SpotOptions {
-    /// Refuses values out of the ranges that the fields state.
+    /// Refuses values outside the ranges stated at the fields.
     pub fn check(&self) -> Result<()> {
         let ranges = [
             ("speckle", self.speckle.unwrap_or(0.1), 0.005, 1.0),
@@ -50,25 +50,25 @@ impl SpotOptions {
     }
 }
 
-/// A spot's centre.
+/// The measured centre of a spot.
 #[derive(Clone, Copy, Debug)]
 pub struct Spot {
-    /// Its centre, px.
+    /// Centre, px.
     pub pixel: Vec2,
-    /// px².
+    /// Covariance of the centre, px².
     pub covariance: Matrix2<f64>,
     /// Sigma of the profile (geometric mean of the ellipse's axes), px.
     pub width_px: f64,
-    /// Peak above the background, grey levels; beyond full scale where it saturates.
+    /// Peak above the background, grey levels; above full scale if the spot saturates.
     pub amplitude: f64,
-    /// How many pixels of its window are at full scale.
+    /// Number of pixels of its window that are at full scale.
     pub saturated_pixels: usize,
-    /// Light of the brightest other spot over this one's.
+    /// Intensity of the brightest other spot relative to this one.
     pub rival: f64,
 }
 
-/// Pixels that are bright in every picture of a recording whatever is in view: at least three
-/// pictures are needed, else none is called bad.
+/// Bad pixels: those whose median over the pictures of a recording is far brighter than the neighbours' medians. With
+/// fewer than three pictures, no pixel counts as bad.
 pub fn hot_pixels(pictures: &[&Image]) -> Vec<bool> {
     let Some(first) = pictures.first() else { return Vec::new() };
     let (w, h) = (first.width as usize, first.height as usize);
@@ -98,7 +98,7 @@ pub fn hot_pixels(pictures: &[&Image]) -> Vec<bool> {
             }
             around.sort_by(f32::total_cmp);
             let (middle, high) = (around[around.len() / 2], around[around.len() * 9 / 10]);
-            // Brighter than nearly all neighbours by more than the scene's own contrast there.
+            // Brighter than nearly all neighbours by more than the local contrast of the scene.
             hot[y * w + x] = at(x, y) > high + 2.0 * (high - middle) + 0.015 * full;
         }
     }
@@ -107,7 +107,7 @@ pub fn hot_pixels(pictures: &[&Image]) -> Vec<bool> {
 
 struct SpotProblem<'a> {
     patch: &'a Patch,
-    /// Per pixel; frozen during one solve.
+    /// Sigma of each pixel, constant during one solve.
     sigma: Vec<f64>,
 }
 
@@ -128,7 +128,7 @@ impl Problem for SpotProblem<'_> {
             let (g, d) = profile(s, x - s[0], y - s[1]);
             let (rho, sigma) = (patch.reflectance[i], self.sigma[i]);
             let model = rho * (s[6] + g);
-            // A saturated pixel says only that the light was at least that; a black one the reverse.
+            // A saturated pixel states only a lower limit of the intensity; a black one only an upper limit.
             let clipped = (patch.grey[i] >= patch.full && model > patch.full) || (patch.grey[i] <= 0.0 && model < 0.0);
             if !clipped {
                 let k = rho / sigma;
@@ -140,19 +140,19 @@ impl Problem for SpotProblem<'_> {
     }
 }
 
-/// What a spot is looked for in.
+/// A picture in which a spot is searched for.
 #[derive(Clone, Copy)]
 pub struct SpotPicture<'a> {
-    /// As messages call it.
+    /// Name in messages.
     pub name: &'a str,
     /// The picture with the laser on.
     pub laser: &'a Image,
-    /// The same view in room light, where the spot lies on a printed board: its print modulates the spot.
+    /// The same view in room light, if the spot lies on a printed board: the print modulates the spot's intensity.
     pub ambient: Option<&'a Image>,
 }
 
-/// Finds one spot in each picture. All pictures come from one camera and laser: they share the
-/// speckle contrast. `hot` comes from [`hot_pixels`]; empty for none.
+/// Finds one spot in each picture. All pictures come from the same camera and laser and share the speckle contrast.
+/// `hot` comes from [`hot_pixels`]; empty if there are none.
 pub fn find_spots(pictures: &[SpotPicture<'_>], hot: &[bool], o: &SpotOptions) -> Result<Vec<Result<Spot>>> {
     o.check()?;
     let mut speckle = o.speckle.unwrap_or(0.15);
@@ -165,7 +165,7 @@ pub fn find_spots(pictures: &[SpotPicture<'_>], hot: &[bool], o: &SpotOptions) -
             collect_scatter(patch, shape, &mut scatter);
         }
         if o.speckle.is_none() && scatter.len() >= 10 {
-            // Six numbers were fitted to the few bright pixels of each spot.
+            // The fit takes five degrees of freedom from the few bright pixels of each spot.
             let spots = found.iter().flatten().count() as f64;
             let n = scatter.len() as f64;
             let robust = crate::solve::robust_scale(&mut scatter, 1);
@@ -175,7 +175,7 @@ pub fn find_spots(pictures: &[SpotPicture<'_>], hot: &[bool], o: &SpotOptions) -
     Ok(found.into_iter().map(|f| measured(&f?, speckle, o)).collect())
 }
 
-/// The spot at the brightest place; a refusal where that is none, or one of two.
+/// Measures the brightest spot; refuses a picture without a spot or with two similar ones.
 fn measured(found: &Brightest, speckle: f64, o: &SpotOptions) -> Result<Spot> {
     let Brightest { patch, shape, rival } = found;
     let (s, covariance) = refine(patch, shape, speckle);
@@ -204,7 +204,7 @@ fn measured(found: &Brightest, speckle: f64, o: &SpotOptions) -> Result<Spot> {
         .cause("a glint or a second reflection of the beam")
         .next("cover the shiny place and take this picture again"));
     }
-    // A centre that is known to less than the spot's own width is no measurement: the fit went away from the light.
+    // A centre with a sigma larger than the spot's width is no measurement: the fit diverged from the spot.
     let known = |c: &Matrix2<f64>| c.symmetric_eigenvalues().max().sqrt() <= width;
     let covariance = covariance.filter(known).ok_or_else(|| {
         Fault::refused("the spot's centre is not determined")
@@ -243,7 +243,8 @@ fn refine(patch: &Patch, start: &Shape, speckle: f64) -> (Shape, Option<Matrix2<
     (shape, covariance)
 }
 
-/// |grey − model| / light of the pixels where light dominates: their spread is the speckle's contrast.
+/// Collects |grey − model| / spot intensity of the pixels where the spot dominates. Their spread is the speckle
+/// contrast.
 fn collect_scatter(patch: &Patch, s: &Shape, out: &mut Vec<f64>) {
     patch.each(|i, x, y| {
         let light = patch.reflectance[i] * profile(s, x - s[0], y - s[1]).0;

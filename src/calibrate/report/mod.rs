@@ -25,7 +25,7 @@ pub struct Page {
 }
 
 impl Page {
-    /// Empty, under this title.
+    /// An empty page with this title.
     pub fn new(title: &str) -> Page {
         Page { title: title.into(), parts: Vec::new() }
     }
@@ -33,7 +33,7 @@ impl Page {
         self.parts.push(part);
         self
     }
-    /// The banner: verdict, reasons and the next best picture, in words.
+    /// The banner with the verdict, its reasons and the next best picture, in words.
     pub fn verdict(&mut self, quality: &Quality) -> &mut Page {
         let class = match quality.verdict {
             Verdict::Good => "good",
@@ -55,7 +55,7 @@ impl Page {
     pub fn paragraph(&mut self, text: &str) -> &mut Page {
         self.add(html! { p { (text) } })
     }
-    /// A table; the first column is text, the others are set to the right.
+    /// A table. The first column is text and aligned left; the others are aligned right.
     pub fn table(&mut self, title: &str, head: &[&str], rows: &[Vec<String>]) -> &mut Page {
         self.add(html! {
             h3 { (title) }
@@ -71,7 +71,7 @@ impl Page {
     pub fn figure(&mut self, caption: &str, svg: &str) -> &mut Page {
         self.add(html! { figure { (PreEscaped(svg)) figcaption { (caption) } } })
     }
-    /// The whole page; it loads nothing from anywhere.
+    /// The complete page as text; it loads no other resource.
     pub fn html(&self) -> String {
         let page = html! {
             (DOCTYPE)

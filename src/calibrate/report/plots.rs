@@ -10,13 +10,13 @@ const BLUE: &str = "#1f6fb2";
 const RED: &str = "#c0392b";
 
 fn open(width: f64, height: f64) -> String {
-    // The namespace lets a plot be saved as a file of its own; it is a name, nothing is loaded.
+    // With the namespace, a plot can be saved as a separate file. It is only a name; nothing is loaded.
     format!(
         "<svg viewBox=\"0 0 {width:.0} {height:.0}\" width=\"{width:.0}\" font-family=\"sans-serif\" font-size=\"11\">"
     )
 }
 
-/// Text made safe inside SVG.
+/// Text escaped for SVG.
 fn safe(text: &str) -> String {
     maud::html! { (text) }.into_string()
 }
@@ -33,7 +33,7 @@ fn line(out: &mut String, a: (f64, f64), b: (f64, f64), colour: &str, width: f64
     );
 }
 
-/// A picture's outline scaled to 640 wide; returns the SVG so far, the scale and the height.
+/// A picture's outline scaled to a width of 640. Returns the SVG so far, the scale and the height.
 fn frame(width: u32, height: u32) -> (String, f64, f64) {
     let s = 640.0 / f64::from(width.max(1));
     let h = f64::from(height) * s;
@@ -42,8 +42,8 @@ fn frame(width: u32, height: u32) -> (String, f64, f64) {
     (out, s, h)
 }
 
-/// Where features were seen in pictures of `width` x `height`; cells of an 8 x 6 raster without any
-/// are shaded red.
+/// Positions of the features seen in pictures of `width` x `height`. Cells of an 8 x 6 grid without any feature are
+/// shaded red.
 pub fn coverage_map(width: u32, height: u32, seen: &[Vec2]) -> String {
     let (mut out, s, h) = frame(width, height);
     let (nx, ny) = (8usize, 6usize);
@@ -77,8 +77,7 @@ pub fn coverage_map(width: u32, height: u32, seen: &[Vec2]) -> String {
     out + "</svg>"
 }
 
-/// Residuals (second, px) at their places (first, px), drawn so that the longest is readable; those
-/// flagged are red.
+/// Residuals (second, px) at their positions (first, px), scaled to a readable length. Flagged ones are red.
 pub fn residual_arrows(width: u32, height: u32, residuals: &[(Vec2, Vec2, bool)]) -> String {
     let (mut out, s, h) = frame(width, height);
     let mut lengths: Vec<f64> = residuals.iter().map(|r| r.1.norm()).collect();
@@ -96,7 +95,7 @@ pub fn residual_arrows(width: u32, height: u32, residuals: &[(Vec2, Vec2, bool)]
     out + "</svg>"
 }
 
-/// One horizontal bar an entry; `limit` is drawn as a line and bars beyond it are red.
+/// One horizontal bar per entry. `limit` is drawn as a line, and bars beyond it are red.
 pub fn bars(entries: &[(String, f64)], unit: &str, limit: Option<f64>) -> String {
     let largest = entries.iter().map(|e| e.1).chain(limit).filter(|v| v.is_finite()).fold(1e-12, f64::max);
     let (left, span, row) = (190.0, 380.0, 16.0);
@@ -118,7 +117,7 @@ pub fn bars(entries: &[(String, f64)], unit: &str, limit: Option<f64>) -> String
     out + "</svg>"
 }
 
-/// Points (x, y) with labelled axes; the ranges are the data's.
+/// Points (x, y) with labelled axes. The axes span the range of the data.
 pub fn scatter(points: &[(f64, f64)], x_label: &str, y_label: &str) -> String {
     let range = |values: &mut dyn Iterator<Item = f64>| {
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
@@ -146,8 +145,8 @@ pub fn scatter(points: &[(f64, f64)], x_label: &str, y_label: &str) -> String {
     out + "</svg>"
 }
 
-/// Directions on the unit sphere seen along -z, for rotation axes and board normals: the centre is
-/// +z or -z (an axis has no sign), the rim is perpendicular to it. A good set fills the disc.
+/// Directions on the unit sphere seen along -z, for rotation axes and board normals. The centre is +z or -z (an
+/// axis has no sign); the rim is perpendicular to it. A good set fills the disc.
 pub fn axis_sphere(axes: &[(Vec3, String)]) -> String {
     let (centre, radius) = (170.0, 150.0);
     let mut out = open(340.0, 340.0);
