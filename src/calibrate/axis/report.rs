@@ -59,9 +59,8 @@ pub fn judge(fit: &AxisFit, limits: &Limits, board_length: &str) -> Quality {
     let mut j = limits.by_error(
         expected,
         format!(
-            "a point that rides along is corrected to {expected:.4} mm (1 sigma) over {over}: {own:.4} mm by \
-             direction and pitch, \
-             the rest scatters from stop to stop or bows"
+            "a point on the axis is placed to {expected:.4} mm (1 sigma) over {over}: {own:.4} mm by direction and \
+             pitch, the rest scatters from stop to stop or bows"
         ),
     );
     contradictions(fit, &mut j);

@@ -16,7 +16,7 @@ export const TABLE = {
       "ステーションはフォルダーそのものです：設定、校正、レシピ、ジョブ。プログラム終了中にコピーしてください。"
     ],
   "A sweep needs camera, laser plane and hand-eye, calibrated.": [
-    "Ein Überstrich braucht Kamera, Laserebene und Hand-Auge, kalibriert.",
+    "Eine Abtastfahrt braucht die Kalibrierungen von Kamera, Laserebene und Hand-Auge.",
     "扫掠需要已标定的相机、激光平面和手眼。",
     "走査には校正済みのカメラ、レーザー平面、ハンドアイが必要です。"
   ],
@@ -44,7 +44,7 @@ export const TABLE = {
   "Approach": ["Anfahren", "接近", "アプローチ"],
   "Arm": ["Scharf schalten", "使能", "有効にする"],
   "Actual spacing at this speed": [
-    "Bei dieser Geschwindigkeit bleiben",
+    "Tatsächlicher Bildabstand bei dieser Geschwindigkeit",
     "此速度下剩余",
     "この速度で残るのは"
   ],
@@ -54,8 +54,8 @@ export const TABLE = {
   "Backed up.": ["Gesichert.", "已备份。", "バックアップしました。"],
   "Backup": ["Sicherung", "备份", "バックアップ"],
   "Batch and repeats": ["Reihe und Wiederholungen", "批处理与重复", "一括と繰り返し"],
-  "Tolerance": ["Verträgt", "允许", "許容"],
-  "Tolerance, degrees": ["Verträgt, Grad", "允许角度", "許容角度"],
+  "Tolerance": ["Toleranz", "允许", "許容"],
+  "Tolerance, degrees": ["Toleranz, Grad", "允许角度", "許容角度"],
   "Benchmark": ["Leistung messen", "性能测试", "ベンチマーク"],
   "Board": ["Tafel", "标定板", "ボード"],
   "Both": ["Beides", "两者", "両方"],
@@ -223,7 +223,7 @@ export const TABLE = {
   "I have looked": ["Ich habe nachgesehen", "我已查看", "確認しました"],
   "In the scan's frame, against the median; only where the part stood still between the recordings.":
     [
-      "Im Rahmen des Scans, gegen den Median; nur wo das Teil zwischen den Aufnahmen stillstand.",
+      "Im Koordinatensystem des Scans, gegen den Median; nur wenn das Teil zwischen den Aufnahmen stillstand.",
       "在扫描坐标系中，相对中位数；仅适用于录制间零件静止时。",
       "走査の座標系で中央値に対して。記録の間に部品が動いていない場合のみ。"
     ],
@@ -276,7 +276,7 @@ export const TABLE = {
     "閲覧。操作は一人ずつ。停止は誰でも"
   ],
   "Number of turns that look alike": [
-    "Sieht nach so vielen Drehungen gleich aus",
+    "Zahl der Drehlagen, die gleich aussehen",
     "旋转多少次看起来相同",
     "この回数の回転で同じに見える"
   ],
@@ -530,7 +530,7 @@ export const TABLE = {
   "State": ["Zustand", "状态", "状態"],
   "Station": ["Station", "工作站", "ステーション"],
   "Step": ["Stufe", "台阶", "段差"],
-  "Stop": ["Halt", "停止", "停止"],
+  "Stop": ["Anhalten", "停止", "停止"],
   "Stop next at": ["Nächster Halt bei", "下一停点", "次の停止点"],
   "Stops along the axis": ["Halte entlang der Achse", "沿轴的停点", "軸に沿った停止点"],
   "Stops of the axis": ["Halte der Achse", "轴的停点", "軸の停止点"],
@@ -541,7 +541,7 @@ export const TABLE = {
     "サポートファイル（画像なし）"
   ],
   "Surface": ["Oberfläche", "表面", "表面"],
-  "Sweep": ["Überstrich", "扫掠", "走査"],
+  "Sweep": ["Abtastfahrt", "扫掠", "走査"],
   "Sweep, mm": ["Strecke, mm", "扫描行程，mm", "走査幅、mm"],
   "Download": ["Herunterladen", "下载", "ダウンロード"],
   "Remove": ["Entfernen", "移除", "除去"],
@@ -709,7 +709,7 @@ export const TABLE = {
   "Verdict": ["Urteil", "结论", "判定"],
   "What": ["Was", "项目", "対象"],
   "The part will drop. Open the gripper?": [
-    "Was er hält, fällt: öffnen?",
+    "Das Teil fällt herunter. Greifer öffnen?",
     "夹持物会掉落：张开？",
     "持っている物が落ちます。開きますか？"
   ],
