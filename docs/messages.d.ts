@@ -6,7 +6,7 @@ export type RobotState = "no_link" | "read_only" | "armed" | "moving";
 
 export type Frames = { 
 /**
- * Handed to the stages.
+ * Passed to the processing stages.
  */
 seen: number, 
 /**
@@ -14,7 +14,7 @@ seen: number,
  */
 measured: number, 
 /**
- * Left out, by cause.
+ * Frames without a result, by cause.
  */
 dropped: Record<string, number>, };
 
@@ -28,27 +28,28 @@ days: number,
  */
 verdict: string, 
 /**
- * Which record has it.
+ * The record with that verdict.
  */
 worst: string, 
 /**
- * Root of the sum of squares of what each expects at the working distance, mm; null where one does not say.
+ * Root sum of squares of the errors that the records expect at the working distance, mm; null if one does not
+ * state it.
  */
 expected_mm: number | null, };
 
 export type Lease = { 
 /**
- * A short name of the tab that holds it; null: nobody.
+ * A short name of the tab that holds the lease; null: no tab holds it.
  */
 holder: string | null, 
 /**
- * Seconds until it falls free.
+ * Seconds until the lease expires.
  */
 seconds_left: number, };
 
 export type Bar = { 
 /**
- * Where pictures come from.
+ * Source of the pictures.
  */
 mode: Mode, 
 /**
@@ -56,7 +57,7 @@ mode: Mode,
  */
 station: string, 
 /**
- * A camera was named.
+ * A camera is configured.
  */
 camera: boolean, 
 /**
@@ -64,51 +65,51 @@ camera: boolean,
  */
 robot: RobotState, 
 /**
- * Line or pointer is on, by the controller's outputs; null without a link that can say.
+ * Line or pointer is on, by the controller's outputs; null if no link reports it.
  */
 laser: boolean | null, 
 /**
- * Of the running scan.
+ * Frames of the running scan, or of the last one.
  */
 frames: Frames, 
 /**
- * From a picture to its points, p50 and p99, ms; null where none was measured yet.
+ * Time from a picture to its points, p50 and p99, ms; null if not measured yet.
  */
 delay_ms: [number, number] | null, 
 /**
- * What the stages run on.
+ * Adapter or processor that runs the stages.
  */
 adapter: string, 
 /**
- * It is software on this machine's cores.
+ * The adapter is software on this machine's cores.
  */
 adapter_is_software: boolean, 
 /**
- * Null without camera, laser plane or what carries them.
+ * Null without a camera, a laser plane, or the calibration of the motion that carries them.
  */
 calibration: CalibrationAge | null, 
 /**
- * On the disk that holds the jobs, GB; null where the system does not say.
+ * Free space on the disk that holds the jobs, GB; null if the system does not report it.
  */
 disk_left_gb: number | null, 
 /**
- * Memory of the program, now and at its most, MB; null where the system does not say.
+ * Memory of the program, now and at its peak, MB; null if the system does not report it.
  */
 memory_mb: [number, number] | null, 
 /**
- * What an operator must know now, one sentence each.
+ * What the operator must know now, one sentence each.
  */
 alarms: Array<string>, 
 /**
- * Who operates.
+ * The tab that may operate.
  */
 lease: Lease, 
 /**
- * The job that runs.
+ * The running job; null: none runs.
  */
 running: string | null, 
 /**
- * Browsers that look on.
+ * Number of connected browsers.
  */
 viewers: number, };
 
@@ -120,7 +121,7 @@ export type Problem = {
  */
 kind: string, 
 /**
- * What happened, with its number and limit.
+ * What happened, with the value and the limit.
  */
 what: string, 
 /**
@@ -140,19 +141,19 @@ export type TeachOrder = {
  */
 scan: string, 
 /**
- * What the recipe is called.
+ * Name of the recipe.
  */
 name: string, 
 /**
- * Corners of the body before it is turned: x0 y0 x1 y1, mm in the grid.
+ * Corners of the body before its rotation: x0 y0 x1 y1, mm in the grid.
  */
 outline: [number, number, number, number], 
 /**
- * Its turn about its centre, degrees.
+ * Its rotation about its centre, degrees.
  */
 angle_deg: number, 
 /**
- * Windows in the body, corners as above.
+ * Windows in the body, corners as for `outline`.
  */
 windows: Array<[number, number, number, number]>, 
 /**
@@ -160,19 +161,19 @@ windows: Array<[number, number, number, number]>,
  */
 holes: Array<[number, number, number]>, 
 /**
- * What the insertion bears in the plane, mm.
+ * Tolerance of the insertion in the plane, mm.
  */
 tolerance_mm: number, 
 /**
- * What it bears as a turn, degrees.
+ * Tolerance of its rotation, degrees.
  */
 tolerance_deg: number, 
 /**
- * The tool's way above the insertion pose before and after, mm.
+ * Distance of the tool above the insertion pose before and after the insertion, mm.
  */
 approach_mm: number, 
 /**
- * It takes the place of the station's own recipe of that name.
+ * Replaces the station's recipe of that name.
  */
 replace: boolean, };
 
@@ -180,11 +181,11 @@ export type Plain = Record<string, never>;
 
 export type ScanOrder = { 
 /**
- * Which one.
+ * Path of the recording.
  */
 recording: string, 
 /**
- * Edge of a cell, mm; null: what the points bear.
+ * Cell size of the map, mm; null: chosen from the points' density.
  */
 cell_mm?: number | null, 
 /**
@@ -192,25 +193,25 @@ cell_mm?: number | null,
  */
 on?: string | null, 
 /**
- * Leave out shots that cannot be read.
+ * Skip shots that cannot be read.
  */
 skip_bad: boolean, 
 /**
- * Settings other than the station's: keys of [extraction] in station.toml, with dots, and their values.
+ * Settings that differ from the station's: dotted keys of [extraction] in station.toml, and their values.
  */
 settings: Record<string, unknown>, };
 
 export type Filter = { "filter": "sigma", 
 /**
- * mm.
+ * Largest standard deviation, mm.
  */
 most_mm: number, } | { "filter": "heights", 
 /**
- * mm.
+ * Lowest height, mm.
  */
 low_mm: number, 
 /**
- * mm.
+ * Highest height, mm.
  */
 high_mm: number, } | { "filter": "cut", 
 /**
@@ -222,41 +223,41 @@ corners: [number, number, number, number], } | { "filter": "keep",
  */
 corners: [number, number, number, number], } | { "filter": "islands", 
 /**
- * Fewer than so many go.
+ * Pieces with fewer cells are removed.
  */
 least_cells: number, 
 /**
- * Neighbours that differ by more are of two pieces, mm.
+ * Neighbouring cells whose heights differ by more belong to different pieces, mm.
  */
 step_mm: number, };
 
 export type Filters = { 
 /**
- * In their order.
+ * In the order in which they are applied.
  */
 filters: Array<Filter>, };
 
 export type Filtered = { 
 /**
- * In their order.
+ * In the order in which they are applied.
  */
 filters: Array<Filter>, 
 /**
- * Cells that each takes.
+ * Number of cells that each filter removes.
  */
 cells: Array<number>, 
 /**
- * Cells that are left.
+ * Number of cells that remain.
  */
 left: number, };
 
 export type FilterOrder = { 
 /**
- * The job that scanned.
+ * The job that made the scan.
  */
 scan: string, 
 /**
- * In their order.
+ * In the order in which they are applied.
  */
 filters: Array<Filter>, };
 
@@ -270,28 +271,28 @@ scans: Array<string>,
  */
 recipe: string, 
 /**
- * Two places in the first scan's map, mm: the tool goes where the middle of the pins there says; null: where the
- * recipe says.
+ * Two positions in the first scan's map, mm: the tool goes to the middle of the pins there; null: to the point
+ * that the recipe names.
  */
 pins?: [[number, number], [number, number]] | null, };
 
 export type TouchOrder = { 
 /**
- * Which recording of the pointer.
+ * Path of the recording of the pointer.
  */
 recording: string, };
 
 export type CalibrateOrder = { 
 /**
- * What.
+ * What to calibrate.
  */
 target: Target, 
 /**
- * From which recording.
+ * Path of the recording.
  */
 recording: string, 
 /**
- * Frames to leave out, from 0.
+ * Frames to exclude, counted from 0.
  */
 leave_out: Array<number>, };
 
@@ -303,15 +304,15 @@ recordings: Array<string>, };
 
 export type AutoOrder = { 
 /**
- * Name of the board's description in the station's folder boards.
+ * Name of the board's description in the station's folder `boards`.
  */
 board: string, 
 /**
- * Expected error of a scanned point at which it is enough, mm rms.
+ * The calibration ends when the expected error of a scanned point is at most this, mm rms.
  */
 target_mm: number, 
 /**
- * Stops at most, 20 to 200; null: 40.
+ * Most stops, 20 to 200; null: 40.
  */
 most?: number | null, };
 
@@ -321,7 +322,7 @@ export type InsertOrder = {
  */
 recipe: string, 
 /**
- * The line sweeps over so much about the picture's middle, mm; null: the field's short side.
+ * Length of the sweep about the picture's middle, mm; null: the field's short side.
  */
 sweep_mm?: number | null, 
 /**
@@ -329,13 +330,13 @@ sweep_mm?: number | null,
  */
 speed_mm_s?: number | null, 
 /**
- * Where it was cut off it goes back up instead of on.
+ * After an interruption, retract instead of continuing.
  */
 back_out: boolean, };
 
 export type BenchmarkOrder = { 
 /**
- * Pictures a second of the camera whose drops are counted; null: 30.
+ * Frame rate of the camera whose drops are counted, Hz; null: 30.
  */
 rate_hz?: number | null, };
 
@@ -347,29 +348,29 @@ export type CheckLine = {
  */
 group: string, 
 /**
- * What was looked at.
+ * What was checked.
  */
 name: string, 
 /**
- * good, poor (works, but read it), bad or absent.
+ * good, poor (works, but read the finding), bad or absent.
  */
 state: string, 
 /**
- * What was seen, with its number and limit.
+ * The finding, with the value and the limit.
  */
 says: string, };
 
 export type ScanFigures = { 
 /**
- * Shots done, those left out included.
+ * Shots processed, skipped ones included.
  */
 shots: number, 
 /**
- * Points of the cloud.
+ * Number of points in the cloud.
  */
 points: number, 
 /**
- * Size of the pictures, px.
+ * Columns of the pictures, px.
  */
 width: number, 
 /**
@@ -381,47 +382,47 @@ height: number,
  */
 frame: string, 
 /**
- * Median of the points' own standard deviations, mm.
+ * Median of the points' standard deviations, mm.
  */
 median_sigma_mm: number | null, 
 /**
- * Share of the map's cells that were measured.
+ * Fraction of the map's cells that were measured.
  */
 coverage: number | null, 
 /**
- * Edge of a cell, mm.
+ * Cell size, mm.
  */
 cell_mm: number | null, 
 /**
- * Heights between which 98 % of the map lies, mm.
+ * Range that contains 98 % of the map's heights, mm.
  */
 z_mm: [number, number] | null, 
 /**
- * Peaks by fate.
+ * Number of peaks by `fate`: kept, or the reason for rejection.
  */
 peaks: Record<string, number>, 
 /**
- * Shots without a point.
+ * Number of shots without a point.
  */
 dark_shots: number, 
 /**
- * Shots left out: name and reason.
+ * Skipped shots: name and reason.
  */
 skipped: Array<[string, string]>, 
 /**
- * From the first shot to the closed cloud, s.
+ * Time from the first shot to the finished cloud, s.
  */
 seconds: number, 
 /**
- * Shots a second of this run.
+ * Shots per second of this run.
  */
 shots_per_second: number, 
 /**
- * Adapter, or this machine's processor and why.
+ * The adapter; or this machine's processor, and why.
  */
 ran_on: string, 
 /**
- * Seconds by what the main thread did.
+ * Seconds by activity of the main thread.
  */
 spent: Record<string, number>, 
 /**
@@ -435,7 +436,7 @@ export type Notation = {
  */
 name: string, 
 /**
- * One a number, with its unit.
+ * One label per number, with its unit.
  */
 labels: Array<string>, 
 /**
@@ -445,15 +446,15 @@ numbers: Array<number>, };
 
 export type RobotPoses = { 
 /**
- * Changes with every number here: a confirmation names the poses that were shown by it.
+ * Hash of all numbers here: a confirmation identifies the shown poses by it.
  */
 hash: string, 
 /**
- * The station's own notation.
+ * The station's pose convention.
  */
 convention: string, 
 /**
- * One a number, with its unit.
+ * One label per number, with its unit.
  */
 labels: Array<string>, 
 /**
@@ -461,51 +462,51 @@ labels: Array<string>,
  */
 approach: Array<number>, 
 /**
- * The tool at its place.
+ * The inserted tool.
  */
 insertion: Array<number>, 
 /**
- * Above it, on the way back.
+ * Above the insertion, on the way back.
  */
 retract: Array<number>, 
 /**
- * The insertion in every notation.
+ * The insertion pose in every convention.
  */
 notations: Array<Notation>, };
 
 export type Term = { 
 /**
- * Its name.
+ * Name of the contribution.
  */
 name: string, 
 /**
- * Along x, y, z of the part, mm; null where it is not known.
+ * Standard deviation along x, y, z of the part, mm; null if unknown.
  */
 sigma_mm: [number, number, number] | null, 
 /**
- * About them, degrees.
+ * Standard deviation about these axes, degrees.
  */
 sigma_deg: [number, number, number] | null, 
 /**
- * What it is.
+ * Explanation.
  */
 note: string, };
 
 export type GateLight = { 
 /**
- * What is judged, with its unit.
+ * The judged quantity, with its unit.
  */
 name: string, 
 /**
- * What was seen.
+ * The measured value.
  */
 value: number, 
 /**
- * What it is held against.
+ * The limit.
  */
 limit: number, 
 /**
- * Kept.
+ * The value keeps the limit.
  */
 passed: boolean, };
 
@@ -519,63 +520,63 @@ recipe: string,
  */
 frame: string, 
 /**
- * Every gate was passed.
+ * Every gate passed.
  */
 passed: boolean, 
 /**
- * Which were not, in words.
+ * The gates that failed, in words.
  */
 reasons: Array<string>, 
 /**
- * Null where a gate was missed.
+ * Null if a gate failed.
  */
 poses: RobotPoses | null, 
 /**
- * One standard deviation along x, y, z of the part, mm.
+ * Standard deviation along x, y, z of the part, mm.
  */
 sigma_mm: [number, number, number], 
 /**
- * One standard deviation of the turns about them, degrees.
+ * Standard deviation of the rotation about these axes, degrees.
  */
 sigma_deg: [number, number, number], 
 /**
- * What the insertion bears in the plane, mm.
+ * Tolerance of the insertion in the plane, mm.
  */
 tolerance_mm: number, 
 /**
- * What it bears as a turn, degrees.
+ * Tolerance of its rotation, degrees.
  */
 tolerance_deg: number, 
 /**
- * 3 sigma within both.
+ * 3 sigma lie within both tolerances.
  */
 within_tolerance: boolean, 
 /**
- * Where the sigma comes from.
+ * Contributions to the standard deviation.
  */
 terms: Array<Term>, 
 /**
- * False: a term is unknown, the sum is a lower bound.
+ * False: a contribution is unknown, so the sum is a lower bound.
  */
 complete: boolean, 
 /**
- * Each gate with its number and limit.
+ * Each gate with its value and limit.
  */
 gates: Array<GateLight>, 
 /**
- * Score of the match, and of the next best.
+ * Score of the match.
  */
 score: number, 
 /**
- * Of the next best pose.
+ * Score of the next best pose.
  */
 second_score: number, 
 /**
- * The part in the scan's frame: row-major 4x4, mm.
+ * Pose of the part in the scan's frame: row-major 4x4, mm.
  */
 part: [number, number, number, number, number, number, number, number, number, number, number, number, number, number, number, number], 
 /**
- * The drawing's outlines in the height map's grid, mm.
+ * Outlines of the drawing in the height map's grid, mm.
  */
 outline: Array<Array<[number, number]>>, 
 /**
@@ -585,7 +586,7 @@ notes: Array<string>, };
 
 export type SurfaceTouched = { 
 /**
- * Unit length, towards the camera; base frame.
+ * Unit normal towards the camera; base frame.
  */
 normal: [number, number, number], 
 /**
@@ -593,59 +594,59 @@ normal: [number, number, number],
  */
 centre_mm: [number, number, number], 
 /**
- * Standard deviation of its tilt: worst direction, and across it, degrees.
+ * Standard deviation of its tilt: in the worst direction, and at right angles to it, degrees.
  */
 tilt_sigma_deg: [number, number], 
 /**
- * How far the spots lie off it, rms, mm.
+ * Distance of the spots from the plane, rms, mm.
  */
 rms_mm: number, 
 /**
- * Angle between it and the base's z, degrees.
+ * Angle between its normal and the base's z axis, degrees.
  */
 tilt_deg: number, 
 /**
- * A spot that does not lie on the plane of the others.
+ * A spot that was excluded because it does not lie on the plane of the others.
  */
 left_out: string | null, };
 
 export type SquareProposed = { 
 /**
- * How far the tool leant at the last shot, degrees.
+ * Tilt of the tool in the last shot, degrees.
  */
 tilt_deg: number, 
 /**
- * One standard deviation of that.
+ * Standard deviation of the tilt, degrees.
  */
 tilt_sigma_deg: number, 
 /**
- * How the robot writes poses.
+ * The robot's pose convention.
  */
 convention: string, 
 /**
- * Names of the numbers.
+ * Labels of the numbers.
  */
 labels: Array<string>, 
 /**
- * Where the flange goes, base frame.
+ * Pose of the flange, base frame.
  */
 flange: Array<number>, 
 /**
- * Where the tool is then, base frame.
+ * Pose of the tool then, base frame.
  */
 tool: Array<number>, };
 
 export type Touched = { 
 /**
- * Picture, distance from the camera along its axis and its standard deviation, mm.
+ * For each spot: picture, distance from the camera along its axis and its standard deviation, mm.
  */
 spots: Array<[string, number, number]>, 
 /**
- * The plane through them.
+ * The plane through the spots.
  */
 surface: SurfaceTouched | null, 
 /**
- * How to stand square to it; null without a surface or without the station's tool.
+ * How to make the tool square to the plane; null without a plane or without the station's tool.
  */
 square: SquareProposed | null, 
 /**
@@ -659,7 +660,7 @@ remarks: Array<string>, };
 
 export type CalibrationFigures = { 
 /**
- * What was calibrated, as files call it.
+ * Kind of calibration, as named in files.
  */
 kind: string, 
 /**
@@ -667,27 +668,27 @@ kind: string,
  */
 verdict: string, 
 /**
- * Why.
+ * Reasons for the verdict.
  */
 reasons: Array<string>, 
 /**
- * The next best picture.
+ * Advice for the next picture.
  */
 advice: Array<string>, 
 /**
- * Named figures, unit in the name.
+ * Figures by name, with the unit in the name.
  */
 figures: Record<string, number>, 
 /**
- * The same of the station's present one; empty without.
+ * The same figures of the station's present calibration; empty if there is none.
  */
 former: Record<string, number>, 
 /**
- * Residual a picture; unit in the heading of the page.
+ * Residual of each picture; the page's heading states the unit.
  */
 per_picture: Array<[string, number]>, 
 /**
- * Pictures that were not used: name and reason.
+ * Excluded pictures: name and reason.
  */
 left_out: Array<[string, string]>, 
 /**
@@ -697,116 +698,116 @@ accepted: boolean, };
 
 export type Inserted = { 
 /**
- * From the beginning to the confirmed position, s.
+ * Time from the start to the confirmed position, s.
  */
 time_to_position_s: number | null, 
 /**
- * Motions that were confirmed until then.
+ * Number of confirmations until then.
  */
 confirmations_to_position: number | null, 
 /**
- * Work and waits, s.
+ * Total duration, work and waiting, s.
  */
 seconds: number, 
 /**
- * Motions that were confirmed.
+ * Number of confirmations in total.
  */
 confirmations: number, 
 /**
- * Where the part was found; null where it was found before the program was started again.
+ * The found part; null if it was found before the program was restarted.
  */
 found: Position | null, };
 
 export type StripeSeen = { 
 /**
- * It lies: it is looked at column by column.
+ * The stripe is horizontal, so it is measured column by column.
  */
 lying: boolean, 
 /**
- * Level that a twentieth of its peaks are above, share of full scale.
+ * Level that 5 % of its peaks exceed, fraction of full scale.
  */
 peak: number, 
 /**
- * Where that is to stand.
+ * Range in which `peak` should lie.
  */
 wanted: [number, number], 
 /**
- * Share of its peaks that are saturated.
+ * Fraction of its peaks that are saturated.
  */
 saturated: number, 
 /**
- * Full width at half height, px, median.
+ * Full width at half maximum, px, median.
  */
 width_px: number, 
 /**
- * Its peak against the level beside it, median.
+ * Its peak relative to the level beside it, median.
  */
 contrast: number, 
 /**
- * Share of the lines without a stripe.
+ * Fraction of the lines without a stripe.
  */
 dark: number, 
 /**
- * Exposure is right.
+ * The exposure is right.
  */
 right: boolean, 
 /**
- * The same in pieces along it, from the left or the top: peak, width in px, contrast, dark share; the first
- * three are 0 where it is dark.
+ * The same for pieces along the stripe, from the left or the top: peak, width in px, contrast, dark fraction.
+ * The first three are 0 where the stripe is dark.
  */
 pieces: Array<[number, number, number, number]>, };
 
 export type PictureLook = { 
 /**
- * Lowest, median, 99th percentile, highest level.
+ * Lowest, median, 99th percentile and highest grey level.
  */
 levels: [number, number, number, number], 
 /**
- * Share of saturated pixels.
+ * Fraction of saturated pixels.
  */
 saturated: number, 
 /**
- * Null where no line of the picture shows a stripe.
+ * Null if no stripe is visible.
  */
 stripe: StripeSeen | null, };
 
 export type ExposureSet = { 
 /**
- * us; it is set.
+ * The exposure that was set, us.
  */
 exposure_us: number, 
 /**
- * What was tried: us, and where the stripe's peaks stood, share of full scale; null: no stripe.
+ * Exposures tried: us, and the level of the stripe's peaks, fraction of full scale; null: no stripe.
  */
 tried: Array<[number, number | null]>, 
 /**
- * What pictures show now.
+ * Measures of the pictures now.
  */
 look: PictureLook, 
 /**
- * Where no exposure is quite right: why this one is the best.
+ * If no exposure is quite right: why this one is the best.
  */
 remark: string | null, };
 
 export type CameraFeature = { 
 /**
- * By the naming convention.
+ * Name of the feature by the standard naming convention.
  */
 name: string, 
 /**
- * What it is; null where it cannot be read.
+ * Current value; null if it cannot be read.
  */
 value: number | boolean | string | null, 
 /**
- * us, dB, px, Hz; empty where it has none.
+ * us, dB, px, Hz; empty if it has none.
  */
 unit: string, 
 /**
- * Lowest and highest; null: none that is known.
+ * Lowest and highest value; null: unknown.
  */
 range: [number, number] | null, 
 /**
- * One of these; empty: not a list.
+ * The allowed values; empty if the feature is not an enumeration.
  */
 words: Array<string>, 
 /**
@@ -816,23 +817,23 @@ writable: boolean, };
 
 export type CameraState = { 
 /**
- * What it can be set to; empty where nothing can, or while it is not there.
+ * Its settings; empty if it has none, or while it is not connected.
  */
 features: Array<CameraFeature>, };
 
 export type SetFeature = { 
 /**
- * By the naming convention, e.g. ExposureTime.
+ * Name of the feature by the standard naming convention, e.g. ExposureTime.
  */
 name: string, 
 /**
- * As text.
+ * The value as text.
  */
 value: string, };
 
 export type BenchRow = { 
 /**
- * What it ran on.
+ * Adapter or processor.
  */
 on: string, 
 /**
@@ -844,13 +845,13 @@ width: number,
  */
 height: number, 
 /**
- * Of the whole chain, ms.
+ * Time of the whole chain, ms.
  */
 ms_per_shot: number, };
 
 export type KeptUp = { 
 /**
- * What it ran on.
+ * Adapter or processor.
  */
 on: string, 
 /**
@@ -862,33 +863,33 @@ width: number,
  */
 height: number, 
 /**
- * Pictures a second that were sent.
+ * Frame rate at which pictures were sent, Hz.
  */
 rate_hz: number, 
 /**
- * Pictures that were sent.
+ * Number of pictures sent.
  */
 sent: number, 
 /**
- * Of these with points.
+ * Number of these that have points.
  */
 measured: number, 
 /**
- * Passed over, because a newer one had come.
+ * Skipped because a newer one had arrived.
  */
 passed_over: number, 
 /**
- * Lost otherwise.
+ * Lost for other reasons.
  */
 lost: number, 
 /**
- * From the last byte to the points, p50 and p99, ms.
+ * Time from the last byte to the points, p50 and p99, ms.
  */
 ms: [number, number], };
 
 export type Outcome = { "procedure": "check", 
 /**
- * In the order in which they were made.
+ * In the order of the checks.
  */
 lines: Array<CheckLine>, } | { "procedure": "scan" } & ScanFigures | { "procedure": "find" } & Position | { "procedure": "teach", 
 /**
@@ -896,19 +897,19 @@ lines: Array<CheckLine>, } | { "procedure": "scan" } & ScanFigures | { "procedur
  */
 recipe: string, 
 /**
- * Found on its own scan.
+ * Result of finding the part in that scan.
  */
 proof: Position, } | { "procedure": "touch" } & Touched | { "procedure": "tune" } & ExposureSet | { "procedure": "calibrate" } & CalibrationFigures | { "procedure": "joint" } & CalibrationFigures | { "procedure": "auto" } & CalibrationFigures | { "procedure": "insert" } & Inserted | { "procedure": "benchmark", 
 /**
- * One a size and processor.
+ * One row per size and processor.
  */
 rows: Array<BenchRow>, 
 /**
- * The same of other machines, as they were recorded.
+ * Recorded rows of other machines.
  */
 recorded: Array<BenchRow>, 
 /**
- * What of a camera was measured and what was dropped, at half and at full resolution.
+ * Measured and dropped pictures of a camera, at half and at full resolution.
  */
 kept_up: Array<KeptUp>, };
 
@@ -918,7 +919,7 @@ export type Job = {
  */
 format: number, 
 /**
- * Name of its folder, e.g. `0007-scan`.
+ * Name of the job's folder, e.g. `0007-scan`.
  */
 id: string, 
 /**
@@ -926,7 +927,7 @@ id: string,
  */
 order: Order, 
 /**
- * What became of it.
+ * State of the job.
  */
 state: JobState, 
 /**
@@ -934,7 +935,7 @@ state: JobState,
  */
 done: number, 
 /**
- * Steps in all; null while nobody knows.
+ * Steps in total; null while unknown.
  */
 of: number | null, 
 /**
@@ -942,7 +943,7 @@ of: number | null,
  */
 created: string, 
 /**
- * Seconds that it ran.
+ * Run time, s.
  */
 seconds: number, 
 /**
@@ -950,17 +951,17 @@ seconds: number,
  */
 problem: Problem | null, 
 /**
- * What came of it.
+ * The result.
  */
 outcome: Outcome | null, 
 /**
- * Steps of an interrupted run are kept: resuming goes on there.
+ * Steps of an interrupted run are stored: resuming continues from them.
  */
 resumable: boolean, };
 
 export type Asked = { 
 /**
- * The job that asks.
+ * The job that proposes it.
  */
 job: string, 
 /**
@@ -968,7 +969,7 @@ job: string,
  */
 step: string, 
 /**
- * What was found, a sentence a line.
+ * What was found, one sentence per line.
  */
 says: Array<string>, 
 /**
@@ -976,67 +977,67 @@ says: Array<string>,
  */
 question: string, 
 /**
- * Names this motion and no other: poses, speed, reason and number.
+ * Identifies this motion: poses, speed, reason and number.
  */
 hash: string, 
 /**
- * What it has to keep, all of it kept.
+ * The gates that the motion must pass, all passed.
  */
 gates: Array<GateLight>, 
 /**
- * Motions that are confirmed as one.
+ * Number of motions that are confirmed together.
  */
 motions: number, 
 /**
- * The fastest of them, mm/s.
+ * Speed of the fastest of them, mm/s.
  */
 speed_mm_s: number, 
 /**
- * How the flange's pose is written.
+ * Convention in which the flange's pose is written.
  */
 convention: string, 
 /**
- * One a number, with its unit.
+ * One label per number, with its unit.
  */
 labels: Array<string>, 
 /**
- * Where the flange ends.
+ * Final pose of the flange.
  */
 numbers: Array<number>, 
 /**
- * The button may stay down from the motion before to this one.
+ * The button may stay pressed from the previous motion to this one.
  */
 stays_down: boolean, 
 /**
- * It has to be confirmed within so long after it was shown, s.
+ * Time within which it must be confirmed after it was shown, s.
  */
 within_s: number, };
 
 export type SimulatedCell = { 
 /**
- * Parts whose component the gripper can hold.
+ * Parts that have a component for the gripper.
  */
 parts: Array<string>, 
 /**
- * Whose it holds.
+ * The part whose component the gripper holds.
  */
 holds: string, 
 /**
- * The arm stands over the part, or over the calibration board.
+ * True: the arm is over the calibration board; false: over the part.
  */
 over_board: boolean, };
 
 export type MotionState = { 
 /**
- * A robot was named.
+ * A robot is configured.
  */
 robot: boolean, 
 /**
- * The program was started with leave to move it.
+ * The program was started with permission to move it.
  */
 may_move: boolean, 
 /**
- * A short name of the tab that armed it; null: it is not armed.
+ * A short name of the tab that armed the robot; null: it is not armed.
  */
 armed: string | null, 
 /**
@@ -1044,47 +1045,47 @@ armed: string | null,
  */
 moving: boolean, 
 /**
- * Why somebody has to look at the robot first; null: nobody has to.
+ * Why a person must look at the robot first; null: nobody must.
  */
 look: string | null, 
 /**
- * The job that moves it, or the last one that did.
+ * The job that moves the robot, or the last one that did.
  */
 job: string | null, 
 /**
- * What waits for a person.
+ * The motion that waits for confirmation.
  */
 asked: Asked | null, 
 /**
- * What the job said so far.
+ * Messages of the job so far.
  */
 said: Array<string>, 
 /**
- * While the last motion was made: the longest that nothing was heard of the held button, ms; null: none was made.
+ * Longest silence of the held button during the last motion, ms; null: there was no motion.
  */
 silence_ms: number | null, 
 /**
- * Of a calibration: stops so far, expected error then, mm.
+ * For a calibration: number of stops, and the error expected after them, mm.
  */
 expected: Array<[number, number]>, 
 /**
- * Null: the robot is none of ours.
+ * Null if the robot is not the simulated one.
  */
 simulated: SimulatedCell | null, };
 
 export type Arming = { 
 /**
- * False: gives it back.
+ * False: disarms it.
  */
 armed: boolean, };
 
 export type InTheCell = { 
 /**
- * Puts the component that belongs to this part into the gripper; null: what it holds stays.
+ * Puts the component of this part into the gripper; null: the gripper keeps its component.
  */
 holds?: string | null, 
 /**
- * Jogs the arm over the calibration board, else over the part.
+ * Jogs the arm over the calibration board; false: over the part.
  */
 over_board: boolean, };
 
@@ -1098,35 +1099,35 @@ bar: Bar,
  */
 jobs: Array<Job>, 
 /**
- * The robot as it may be moved from here.
+ * The robot's state for motions.
  */
 motion: MotionState, } } | { "event": "bar", "data": Bar } | { "event": "job", "data": Job } | { "event": "motion", "data": MotionState } | { "event": "gone", "data": string };
 
 export type Knock = { 
 /**
- * Of this start of the program.
+ * The token of this program start.
  */
 token: string | null, 
 /**
- * Where the screen is served to other machines.
+ * The password, if the screen is served to other machines.
  */
 password: string | null, };
 
 export type Session = { 
 /**
- * A short name of the tab that asks.
+ * A short name of the tab that sent the request.
  */
 tab: string, };
 
 export type TakeLease = { 
 /**
- * Also where another one operates.
+ * Takes it even if another tab operates.
  */
 firmly: boolean, };
 
 export type Confirmed = { 
 /**
- * The job that asks.
+ * The job that proposes the motion.
  */
 job: string, 
 /**
@@ -1136,27 +1137,27 @@ hash: string, };
 
 export type Grant = { 
 /**
- * The name under which it is redeemed, once.
+ * The name under which the confirmation is redeemed once.
  */
 grant: string, };
 
 export type Redeem = { 
 /**
- * What pressing it gave.
+ * The grant that pressing the button returned.
  */
 grant: string, 
 /**
- * What is confirmed, again.
+ * The confirmed motion again.
  */
 what: Confirmed, };
 
 export type CalibrationState = { 
 /**
- * As files call it.
+ * Name in files.
  */
 kind: string, 
 /**
- * For people.
+ * Name for people.
  */
 words: string, 
 /**
@@ -1168,7 +1169,7 @@ verdict: string,
  */
 created: string, 
 /**
- * How long ago, days.
+ * Its age, days.
  */
 days: number, 
 /**
@@ -1182,15 +1183,15 @@ export type FrameInfo = {
  */
 name: string, 
 /**
- * flange or base.
+ * The frame it is relative to: flange or base.
  */
 on: string, 
 /**
- * Names of the numbers.
+ * Labels of the numbers.
  */
 labels: Array<string>, 
 /**
- * mm, degrees or as the notation has them.
+ * mm, degrees, or units of the convention.
  */
 numbers: Array<number>, };
 
@@ -1200,7 +1201,7 @@ export type StationInfo = {
  */
 name: string, 
 /**
- * Where pictures come from.
+ * Source of the pictures.
  */
 mode: Mode, 
 /**
@@ -1208,7 +1209,7 @@ mode: Mode,
  */
 program: string, 
 /**
- * How its robot writes poses; null: as matrices.
+ * The robot's pose convention; null: poses are written as matrices.
  */
 robot: string | null, 
 /**
@@ -1216,37 +1217,37 @@ robot: string | null,
  */
 mount: string | null, 
 /**
- * What the work tolerates, mm.
+ * Tolerance of the work, mm.
  */
 tolerance_mm: number | null, 
 /**
- * Camera depths at which points are believed, mm.
+ * Range of camera depths in which points are accepted, mm.
  */
 volume_mm: [number, number] | null, 
 /**
- * Frame of scans and of the poses that are found in them: base, axis or camera.
+ * Frame of scans and of poses found in them: base, axis or camera.
  */
 work_frame: string, 
 /**
- * Frames that are fixed to others, in the robot's notation.
+ * Fixed frames relative to others, in the robot's convention.
  */
 frames: Array<FrameInfo>, 
 /**
- * One a calibration that there is.
+ * One entry per existing calibration.
  */
 calibrations: Array<CalibrationState>, 
 /**
- * What is wrong with it; null: nothing.
+ * What is wrong with the station; null: nothing.
  */
 problem: Problem | null, 
 /**
- * Names of all settings of the extraction, with dots, and the station's values.
+ * Dotted names of all extraction settings, with the station's values.
  */
 extraction: Record<string, unknown>, };
 
 export type BackupInfo = { 
 /**
- * Its file.
+ * Name of its file.
  */
 name: string, 
 /**
@@ -1254,29 +1255,29 @@ name: string,
  */
 created: string, 
 /**
- * Files of the station in it.
+ * Number of the station's files in it.
  */
 files: number, 
 /**
- * Bytes.
+ * Size in bytes.
  */
 bytes: number, };
 
 export type SettingsState = { 
 /**
- * station.toml as it lies there.
+ * The text of station.toml.
  */
 text: string, 
 /**
- * SHA-256 of it: a change names the text that it was made from.
+ * SHA-256 of the text: a change names the text that it was made from.
  */
 sha256: string, 
 /**
- * Its settings by their names with dots; empty where the text cannot be read.
+ * The settings by their dotted names; empty if the text cannot be read.
  */
 values: Record<string, unknown>, 
 /**
- * Notations that poses can be written in.
+ * Available pose conventions.
  */
 notations: Array<string>, 
 /**
@@ -1284,7 +1285,7 @@ notations: Array<string>,
  */
 folder: string, 
 /**
- * The folder below which recordings lie.
+ * The folder that contains the recordings.
  */
 recordings: string, 
 /**
@@ -1298,7 +1299,7 @@ backups: Array<BackupInfo>, };
 
 export type SettingsAsk = { 
 /**
- * SHA-256 of the text that this was made from.
+ * SHA-256 of the text that this change was made from.
  */
 sha256: string, 
 /**
@@ -1306,13 +1307,13 @@ sha256: string,
  */
 text?: string | null, 
 /**
- * Settings by their names with dots; null takes one out. Comments and all else stay.
+ * Settings by their dotted names; null removes one. Comments and all other settings stay.
  */
 changes: Record<string, unknown>, };
 
 export type OutputAsk = { 
 /**
- * line, pointer or room: lit for a moment; open or close: the gripper.
+ * line, pointer or room: on for a moment; open or close: the gripper.
  */
 output: string, };
 
@@ -1322,15 +1323,15 @@ export type RecordingInfo = {
  */
 name: string, 
 /**
- * What it calls itself.
+ * The name stated in its meta.json.
  */
 set: string, 
 /**
- * Moments in it.
+ * Number of frames.
  */
 frames: number, 
 /**
- * Size of its pictures, px.
+ * Columns of its pictures, px.
  */
 width: number, 
 /**
@@ -1338,11 +1339,11 @@ width: number,
  */
 height: number, 
 /**
- * line, pointer; null where no laser is on.
+ * line or pointer; null if no laser is on.
  */
 beam: string | null, 
 /**
- * It shows a board.
+ * It shows a calibration board.
  */
 board: boolean, 
 /**
@@ -1356,11 +1357,11 @@ problem: Problem | null, };
 
 export type BoardView = { 
 /**
- * What it is called.
+ * Name of the picture.
  */
 name: string, 
 /**
- * Its file, in the job.
+ * Its file in the job's folder.
  */
 file: string, 
 /**
@@ -1372,17 +1373,17 @@ width: number,
  */
 height: number, 
 /**
- * The corners that were found, u and v, px.
+ * The detected corners, u and v, px.
  */
 corners: Array<[number, number]>, 
 /**
- * How far the board's normal leans away from the camera's axis, to the right and downwards in the picture,
- * degrees, by the station's camera or else one as long as its picture is wide; null where too little of the
+ * Tilt of the board's normal from the camera's axis, to the right and downwards in the picture, degrees. Uses
+ * the station's camera, or else a focal length equal to the picture's width in px. Null if too little of the
  * board was found.
  */
 lean_deg: [number, number] | null, 
 /**
- * Where the axis stood that the board rides on, counts; null without one, or where it is not known.
+ * Position of the axis that carries the board, counts; null without an axis, or if unknown.
  */
 count: number | null, };
 
@@ -1392,13 +1393,13 @@ export type ViewRef = {
  */
 recording: string, 
 /**
- * Its frame, from 0.
+ * Frame number, counted from 0.
  */
 frame: number, };
 
 export type SupportAsk = { 
 /**
- * Somebody ticked it.
+ * A person ticked the option.
  */
 pictures: boolean, };
 
@@ -1408,15 +1409,15 @@ export type PictureRef = {
  */
 recording: string, 
 /**
- * Its frame, from 0.
+ * Frame number, counted from 0.
  */
 frame: number, 
 /**
- * laser or ambient; without: whichever there is.
+ * laser or ambient; null: whichever exists.
  */
 light: string | null, 
 /**
- * Columns of the answer, 16 to 4096; without: the picture's own.
+ * Columns of the answer, 16 to 4096; null: as the picture.
  */
 width: number | null, };
 
@@ -1426,15 +1427,15 @@ export type RecipeText = {
  */
 name: string, 
 /**
- * What people call the part; read from the text.
+ * Name of the part for people; read from the text.
  */
 title: string, 
 /**
- * Ships with the program; it is copied when it is changed.
+ * The recipe ships with the program; it is copied when it is changed.
  */
 shipped: boolean, 
 /**
- * TOML; empty where it cannot be read at all.
+ * TOML; empty if the file cannot be read at all.
  */
 text: string, 
 /**
@@ -1448,7 +1449,7 @@ export type RecipeAsk = {
  */
 text: string, 
 /**
- * It takes the place of the station's own recipe of that name.
+ * Replaces the station's recipe of that name.
  */
 replace: boolean, };
 
@@ -1460,25 +1461,25 @@ text: string, };
 
 export type RecipePoint = { 
 /**
- * By which constructions and the insertion name it.
+ * The name by which constructions and the insertion refer to it.
  */
 name: string, 
 /**
- * In the part's frame, as drawn, mm.
+ * Position in the part's frame, as drawn, mm.
  */
 at: [number, number], 
 /**
- * shape, grid, or the construction's: midpoint, line, intersection, offset, lattice.
+ * shape, grid, or the kind of construction: midpoint, line, intersection, offset, lattice.
  */
 kind: string, 
 /**
- * The tool goes there.
+ * The tool goes to this point.
  */
 chosen: boolean, };
 
 export type NewPoint = { 
 /**
- * By which later ones and the insertion name it.
+ * The name by which later points and the insertion refer to it.
  */
 name: string, 
 /**
@@ -1486,25 +1487,25 @@ name: string,
  */
 kind: string, 
 /**
- * Names of shapes, or of points before it.
+ * Names of shapes, or of earlier points.
  */
 of: Array<string>, 
 /**
- * Of an offset: the line or lattice that gives the direction.
+ * For an offset: the line or lattice that gives the direction.
  */
 along?: string | null, 
 /**
- * Of an offset: along and across, mm.
+ * For an offset: distance along and across that direction, mm.
  */
 by_mm?: [number, number] | null, };
 
 export type PointChange = { "add": NewPoint } | { "take_out": { 
 /**
- * Which one.
+ * Name of the point.
  */
 name: string, } } | { "choose": { 
 /**
- * Which one; null: the part's own place.
+ * Name of the point; null: the part's datum.
  */
 name: string | null, } };
 
@@ -1514,23 +1515,23 @@ export type PointsChange = {
  */
 text: string, 
 /**
- * What changes.
+ * The change.
  */
 change: PointChange, };
 
 export type PointsChanged = { 
 /**
- * TOML, with all comments that it had.
+ * TOML, with all its comments.
  */
 text: string, 
 /**
- * Its points now.
+ * Its points after the change.
  */
 points: Array<RecipePoint>, };
 
 export type DrawingAsk = { 
 /**
- * What the recipe is called.
+ * Name of the recipe.
  */
 name: string, 
 /**
@@ -1538,53 +1539,53 @@ name: string,
  */
 text: string, 
 /**
- * mm, inch, cm, m, um, mil or foot, where the drawing names none; null: the one it names.
+ * Unit if the drawing states none: mm, inch, cm, m, um, mil or foot; null: the unit stated in the drawing.
  */
 unit?: string | null, 
 /**
- * Layers that hold the part's edges; none: all that are shown.
+ * Layers that contain the part's edges; empty: all visible layers.
  */
 layers: Array<string>, 
 /**
- * The insertion datum in the drawing, in its unit; null: the middle of the largest outline's box.
+ * The insertion datum in the drawing, in its unit; null: the middle of the largest outline's bounding box.
  */
 origin?: [number, number] | null, 
 /**
- * How many turns make the part look nearly alike.
+ * Number of rotations at which the part looks nearly alike.
  */
 alike_turns: number, 
 /**
- * Edge of a cell of the map that is searched, mm.
+ * Cell size of the map that is searched, mm.
  */
 cell_mm: number, 
 /**
- * What the insertion bears in the plane, mm.
+ * Tolerance of the insertion in the plane, mm.
  */
 tolerance_mm: number, 
 /**
- * What it bears as a turn, degrees.
+ * Tolerance of its rotation, degrees.
  */
 tolerance_deg: number, 
 /**
- * The tool's way above the insertion pose before and after, mm.
+ * Distance of the tool above the insertion pose before and after the insertion, mm.
  */
 approach_mm: number, 
 /**
- * It takes the place of the station's own recipe of that name.
+ * Replaces the station's recipe of that name.
  */
 replace: boolean, };
 
 export type DrawingRead = { 
 /**
- * The recipe, stored.
+ * The recipe, as stored.
  */
 recipe: RecipeText, 
 /**
- * Width and height of what was drawn, mm.
+ * Width and height of the drawn part, mm.
  */
 size_mm: [number, number], 
 /**
- * What was passed over, and what to look at.
+ * What was skipped in the drawing, and what to check.
  */
 notes: Array<string>, };
 
@@ -1598,71 +1599,72 @@ width: number,
  */
 height: number, 
 /**
- * Edge of a cell, mm; the centre of cell (i, j) is at ((i + 0.5) cell, (j + 0.5) cell).
+ * Cell size, mm; the centre of cell (i, j) is at ((i + 0.5) cell, (j + 0.5) cell).
  */
 cell_mm: number, 
 /**
- * Grid in the cloud's frame: row-major 4x4, mm.
+ * Pose of the grid in the cloud's frame: row-major 4x4, mm.
  */
 base_from_grid: [number, number, number, number, number, number, number, number, number, number, number, number, number, number, number, number], 
 /**
- * Heights between which 99 % lies, mm.
+ * Range that contains 99 % of the heights, mm.
  */
 z_mm: [number, number], 
 /**
- * The same of the standard deviation, mm.
+ * The same for the standard deviation, mm.
  */
 sigma_mm: [number, number], 
 /**
- * The same of the stripe's amplitude, grey levels.
+ * The same for the stripe's amplitude, grey levels.
  */
 intensity: [number, number], };
 
 export type Outlines = { 
 /**
- * The scan's: base, axis, flange or map.
+ * Frame of the scan: base, axis, flange or map.
  */
 frame: string, 
 /**
- * One a shape, x y z in that frame, mm; closed ones end where they begin.
+ * One line per shape, x y z in that frame, mm; closed lines end at their first point.
  */
 lines: Array<Array<[number, number, number]>>, };
 
 export type Ghost = { 
 /**
- * The picture over which they belong.
+ * Number of the picture that they belong to.
  */
 number: number, 
 /**
- * u and v, px; lines end where they leave what the lens shows.
+ * u and v, px; lines end where they leave the lens's field of view.
  */
 lines: Array<Array<[number, number]>>, 
 /**
- * So far the arm moved them between the readings of its pose before and after the picture, px; 0: it stood.
+ * How far the arm's motion between the pose readings before and after the picture shifts the outlines, px; 0:
+ * the arm stood still.
  */
 moved_px: number, };
 
 export type SectionAsk = { 
 /**
- * Where it begins, mm.
+ * Start, mm.
  */
 from: [number, number], 
 /**
- * Where it ends, mm.
+ * End, mm.
  */
 to: [number, number], 
 /**
- * Pieces of it to which lines are fitted: from and to along the section, mm; at most two.
+ * Pieces of the section to which lines are fitted: start and end along the section, mm; at most two.
  */
 fits: Array<[number, number]>, };
 
 export type SectionPoint = { 
 /**
- * Along the section, mm.
+ * Distance along the section, mm.
  */
 s: number, 
 /**
- * Height; null where nothing was measured.
+ * Height, mm; null if nothing was measured.
  */
 z: number | null, 
 /**
@@ -1672,17 +1674,17 @@ sigma: number | null, };
 
 export type Distance = { 
 /**
- * mm, or degrees where it is an angle.
+ * mm, or degrees for an angle.
  */
 value: number, 
 /**
- * One standard deviation, in the same unit.
+ * Standard deviation, in the same unit.
  */
 sigma: number, };
 
 export type Fit = { 
 /**
- * Where it begins and ends along the section, mm.
+ * Start and end along the section, mm.
  */
 piece: [number, number], 
 /**
@@ -1690,23 +1692,23 @@ piece: [number, number],
  */
 height_mm: number, 
 /**
- * Standard deviation of that, mm.
+ * Standard deviation of the height, mm.
  */
 height_sigma_mm: number, 
 /**
- * Its angle against the grid's plane, degrees.
+ * Its angle to the grid's plane, degrees.
  */
 angle_deg: number, 
 /**
- * Standard deviation of that, degrees.
+ * Standard deviation of the angle, degrees.
  */
 angle_sigma_deg: number, 
 /**
- * How far the places lie off it, rms, mm.
+ * Distance of the points from the line, rms, mm.
  */
 rms_mm: number, 
 /**
- * Places that it was fitted to.
+ * Number of points in the fit.
  */
 places: number, };
 
@@ -1716,15 +1718,15 @@ export type Section = {
  */
 length_mm: number, 
 /**
- * A place each half cell.
+ * One point per half cell.
  */
 points: Array<SectionPoint>, 
 /**
- * One a piece.
+ * One fit per piece.
  */
 fits: Array<Fit>, 
 /**
- * Height of the second piece's middle over the first one's line, mm; with two pieces.
+ * Height of the second piece's middle above the first piece's line, mm; only with two pieces.
  */
 step: Distance | null, 
 /**
@@ -1734,21 +1736,21 @@ angle: Distance | null, };
 
 export type PointsAsk = { 
 /**
- * mm in the grid.
+ * First point, mm in the grid.
  */
 a: [number, number], 
 /**
- * mm in the grid.
+ * Second point, mm in the grid.
  */
 b: [number, number], };
 
 export type PlaneAsk = { 
 /**
- * mm in the grid.
+ * The point, mm in the grid.
  */
 point: [number, number], 
 /**
- * Corners of the box that holds the plane: x0 y0 x1 y1, mm in the grid.
+ * Corners of the box to whose surface the plane is fitted: x0 y0 x1 y1, mm in the grid.
  */
 plane: [number, number, number, number], };
 
@@ -1756,23 +1758,23 @@ export type Measure = { "measure": "two_points" } & PointsAsk | { "measure": "po
 
 export type MeasureAnswer = { 
 /**
- * The distance, mm; of a point above its plane positive.
+ * The distance, mm; positive for a point above its plane.
  */
 distance: Distance, 
 /**
- * Along x, y, z of the grid, mm; of two points.
+ * Components along x, y, z of the grid, mm; only for two points.
  */
 along: [number, number, number] | null, 
 /**
- * Of the plane against the grid, degrees.
+ * Tilt of the plane relative to the grid, degrees.
  */
 tilt: Distance | null, 
 /**
- * How far the plane's cells lie off it, rms, mm.
+ * Distance of the plane's cells from it, rms, mm.
  */
 rms_mm: number | null, 
 /**
- * Cells that went in.
+ * Number of cells used.
  */
 cells: number, };
 
@@ -1782,27 +1784,27 @@ export type SweepAsk = {
  */
 recipe: string, 
 /**
- * An insertion that touched the board already.
+ * Name of an insertion job that has already touched the board.
  */
 job?: string | null, 
 /**
- * From the camera to the board, mm, before it was touched.
+ * Distance from the camera to the board, mm, before it was touched.
  */
 distance_mm?: number | null, 
 /**
- * Length, mm.
+ * Length of the sweep, mm.
  */
 sweep_mm?: number | null, 
 /**
- * From one shot to the next, mm.
+ * Distance between shots, mm.
  */
 step_mm?: number | null, 
 /**
- * mm/s; without: the fastest that all bear.
+ * Speed, mm/s; null: the highest that camera, chain and station allow.
  */
 speed_mm_s?: number | null, 
 /**
- * Pictures a second of another camera than the one that is linked.
+ * Frame rate of another camera than the connected one, Hz.
  */
 camera_hz?: number | null, };
 
@@ -1812,27 +1814,27 @@ export type Pace = {
  */
 speed_mm_s: number, 
 /**
- * mm a shot.
+ * Distance between shots, mm.
  */
 step_mm: number, 
 /**
- * Pictures a second.
+ * Frame rate, Hz.
  */
 rate_hz: number, 
 /**
- * Over the whole length, s.
+ * Duration over the whole length, s.
  */
 seconds: number, 
 /**
- * camera, chain or speed: the one that allows no more; null: none does.
+ * camera, chain or speed: the limiting one; null: none is known.
  */
 limited_by: string | null, 
 /**
- * The fastest that each of them bears at this step, mm/s.
+ * The highest speed that each of them allows at this step, mm/s.
  */
 bears: Array<[string, number]>, 
 /**
- * The step that is left at this speed, mm.
+ * The step that results at this speed, mm.
  */
 left_step_mm: number, };
 
@@ -1842,87 +1844,87 @@ export type SweepPlan = {
  */
 recipe: string, 
 /**
- * The board was touched; else it is taken to lie squarely before the camera.
+ * True: the board was touched; false: it is assumed to be square to the camera.
  */
 touched: boolean, 
 /**
- * From the board to the camera, mm.
+ * Distance from the board to the camera, mm.
  */
 depth_mm: number, 
 /**
- * From the first shot's stripe to the last one's, mm.
+ * Distance from the first shot's stripe to the last one's, mm.
  */
 length_mm: number, 
 /**
- * From one shot to the next, mm.
+ * Distance between shots, mm.
  */
 step_mm: number, 
 /**
- * Pictures.
+ * Number of pictures.
  */
 shots: number, 
 /**
- * Across the part however it is turned, mm.
+ * Size of the part in any rotation: the diagonal of its drawing, mm.
  */
 part_mm: number, 
 /**
- * What the camera sees of the board: x0 y0 x1 y1, mm.
+ * The camera's field of view on the board: x0 y0 x1 y1, mm.
  */
 field_mm: [number, number, number, number], 
 /**
- * Ends of the first shot's stripe, then of the last one's, in the order around what is swept, mm.
+ * The corners of the swept area in order: the ends of the first shot's stripe, then of the last one's, mm.
  */
 swept_mm: [[number, number], [number, number], [number, number], [number, number]], 
 /**
- * How far the part may lie off the picture's middle along the sweep, mm; negative: it is never swept whole.
+ * Largest offset of the part from the picture's middle along the sweep, mm; negative: it is never swept
+ * completely.
  */
 along_mm: number, 
 /**
- * The same along the stripe.
+ * The same across the sweep, along the stripe.
  */
 across_mm: number, 
 /**
- * Left of the working volume above the board and below it, mm; null: nobody knows it.
+ * Reserve of the working volume above and below the board, mm; null: unknown.
  */
 volume_mm: [number, number] | null, 
 /**
- * Left to the sides of the flange's box, mm; negative: outside; null: no box is stated or the robot's place is
- * not known.
+ * Distance of the flange from the sides of its box, mm; negative: outside; null: no box is stated, or the
+ * robot's pose is unknown.
  */
 box_mm: number | null, 
 /**
- * Names of a flange pose's numbers.
+ * Labels of a flange pose's numbers.
  */
 labels: Array<string>, 
 /**
- * The flange at the first and the last shot; empty where the robot's place is not known.
+ * Poses of the flange at the first and the last shot; empty if the robot's pose is unknown.
  */
 flange: Array<Array<number>>, 
 /**
- * What is swept, and how far a part in its middle reaches, in the camera's picture as it stands now, px; empty:
- * not known.
+ * The swept area, and the extent of a part in its middle, in the camera's present picture, px; empty: unknown.
  */
 seen_px: Array<Array<[number, number]>>, 
 /**
- * Pictures a second that the camera sends; null: not known.
+ * Frame rate of the camera, Hz; null: unknown.
  */
 camera_hz: number | null, 
 /**
- * Pictures of this size that a scan of this station measured in a second; null: none did.
+ * Rate at which a scan of this station measured pictures of this size, Hz; null: no scan did.
  */
 chain_hz: number | null, 
 /**
- * The station's limit, mm/s.
+ * The station's speed limit, mm/s.
  */
 limit_mm_s: number | null, 
 /**
- * Of a scan that does not stop for its pictures; null: nothing is known that limits it.
+ * Pace of a scan that does not stop for its pictures; null: no limit is known.
  */
 pace: Pace | null, };
 
 export type RepeatsAsk = { 
 /**
- * Their names.
+ * Names of the jobs.
  */
 jobs: Array<string>, };
 
@@ -1936,32 +1938,32 @@ name: string,
  */
 unit: string, 
 /**
- * One standard deviation of the places.
+ * Standard deviation of the poses.
  */
 scatter: number, 
 /**
- * What they state of themselves, root mean square.
+ * Root mean square of the standard deviations that the poses state.
  */
 stated: number, 
 /**
- * From the first to the last of them.
+ * Range from the lowest to the highest value.
  */
 apart: number, 
 /**
- * The histogram reaches so far to both sides of the median.
+ * Half width of the histogram, centred on the median.
  */
 half: number, 
 /**
- * Places in each of its bars.
+ * Number of poses in each bar of the histogram.
  */
 bars: Array<number>, };
 
 export type Repeats = { 
 /**
- * Of how many.
+ * Number of poses.
  */
 places: number, 
 /**
- * x, y, z, turn; empty of fewer than two.
+ * For x, y, z and rotation; empty for fewer than two poses.
  */
 along: Array<Spread>, };
