@@ -1,4 +1,4 @@
-//! In: a camera and its covariance. Out: how far a viewing ray is expected to be off.
+//! In: a camera and its covariance. Out: the expected error of a viewing ray.
 //! Frame and unit: px.
 
 use crate::calibrate::projection::project;
@@ -6,9 +6,8 @@ use crate::camera::{Intrinsics, PARAMETERS, ParameterMatrix};
 use crate::geometry::{Vec2, Vec3, skew};
 use nalgebra::DMatrix;
 
-/// How viewing rays move over the image when the intrinsics do: rows are the displacements in px (u, v)
-/// on a 9 x 7 raster, with the part that a rotation of the whole camera would explain taken out
-/// (docs/math.md, Camera calibration (8)).
+/// Derivatives of the viewing rays by the intrinsics. Rows are displacements in px (u, v) on a 9 x 7 grid; the part
+/// that a rotation of the entire camera explains is removed (docs/math.md, Camera calibration (8)).
 fn ray_jacobian(k: &Intrinsics) -> DMatrix<f64> {
     let mut a = Vec::new();
     let mut b = Vec::new();
@@ -32,14 +31,14 @@ fn ray_jacobian(k: &Intrinsics) -> DMatrix<f64> {
     turn.map_or(a.clone(), |t| a - b * t)
 }
 
-/// Rms distance of one camera's viewing rays from another's over the image, px, after the best rotation.
+/// rms distance between the viewing rays of two cameras over the image, px, after the best rotation.
 pub(super) fn rays_apart(a: &Intrinsics, b: &Intrinsics) -> f64 {
     let moved = ray_jacobian(a) * (b.parameters() - a.parameters());
     (moved.norm_squared() / (moved.len() as f64 / 2.0)).sqrt()
 }
 
-/// Expected rms displacement of the viewing rays over the image, px, after the best rotation, from
-/// the covariance of the camera's parameters.
+/// Expected rms displacement of the viewing rays over the image, px, after the best rotation, from the covariance of
+/// the camera's parameters.
 pub fn expected_ray_error(k: &Intrinsics, covariance: &ParameterMatrix) -> f64 {
     let j = ray_jacobian(k);
     let sum: f64 = (&j * covariance).component_mul(&j).sum();
