@@ -154,7 +154,7 @@ fn grow(blobs: &[Blob], seed: usize) -> HashMap<Node, usize> {
     near.sort_by(|a, b| a.norm().total_cmp(&b.norm()));
     let cross = |a: &Vec2, b: &Vec2| a.x * b.y - a.y * b.x;
     let Some(&u) = near.first() else { return HashMap::new() };
-    // The second step points to the right of the first, at an angle of 37 degrees or more.
+    // The second step points to the right of the first, at an angle of 37 to 143 degrees.
     let Some(&v) = near.iter().take(8).find(|d| cross(&u, d) > 0.6 * u.norm() * d.norm()) else {
         return HashMap::new();
     };
