@@ -73,7 +73,7 @@ pub struct MeasuredPose {
     pub information: Matrix6<f64>,
     /// Step of the pose per unit of each camera parameter.
     pub by_intrinsics: ByIntrinsics,
-    /// What the same pixels say about the camera.
+    /// Information about the camera from the same pixels.
     pub about_camera: AboutCamera,
     /// rms of the feature residuals per coordinate, px; NaN for a pose that was given without pixels.
     pub rms_px: f64,

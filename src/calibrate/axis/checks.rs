@@ -105,8 +105,8 @@ impl Suspects {
     }
 }
 
-/// Bow over the whole travel, from end to middle, and its sigma, mm: fit of count and squared count, besides the
-/// line, to the residuals of the positions. A bent linear axis leaves one, and so does a table that does not run
+/// Bow over the entire travel, from end to middle, and its sigma, mm. It is the quadratic term of a polynomial in the
+/// count, fitted to the residuals of the positions. A bent linear axis has a bow, and so has a table that does not run
 /// true.
 pub(super) fn bend(seen: &[&Seen], state: &State, scatter: &Scatter) -> [f64; 2] {
     if seen.len() < 4 {

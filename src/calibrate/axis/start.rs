@@ -1,6 +1,6 @@
 //! In: boards at stops, some of which may be wrong. Out: the motion that most of them agree on, the stops that agree,
-//! and their scatter about it. Every pair (on a turntable: neighbours) proposes a motion. The proposal with the
-//! smallest median distance to the stops wins.
+//! and their scatter about it. Every pair (on a turntable: neighbours) proposes a motion. The proposal that
+//! 60 % of the stops lie closest to wins.
 //! Frame and unit: camera frame, mm, rad, counts (docs/math.md, Axis (5)).
 
 use super::terms::{Scatter, Seen, State};
@@ -11,7 +11,7 @@ pub(super) struct Start {
     pub state: State,
     pub agreeing: Vec<usize>,
     pub scatter: Scatter,
-    /// Median distance of the stops from their expected positions, mm.
+    /// Distance from the expected positions within which [`MAJORITY`] of the stops lie, mm.
     pub spread: f64,
 }
 

@@ -1,5 +1,5 @@
-//! In: a picture and a circle grid. Out: the images of the dots' centres with their ids, free of the
-//! bias between an ellipse's centre and the image of the circle's centre, or why not.
+//! In: a picture and a circle grid. Out: the images of the dots' centres with their ids, corrected for the offset
+//! between an ellipse's centre and the image of the circle's centre; or the reason for a failure.
 //! Frame and unit: pixels; ids row by row as in `BoardSpec::features()`.
 
 use super::ellipse::{Dot, dot};
@@ -13,7 +13,7 @@ use crate::recording::BoardSpec;
 use nalgebra::Matrix2;
 use std::collections::{HashMap, VecDeque};
 
-/// A connected patch that is elliptic.
+/// A connected patch of elliptic shape.
 struct Blob {
     centre: Vec2,
     /// A of the ellipse qᵀAq = 1, 1/px².
@@ -23,7 +23,7 @@ struct Blob {
 /// A lattice coordinate.
 type Node = (i32, i32);
 
-/// Finds a grid that is wholly in view; dark dots on bright or bright ones on dark.
+/// Finds a grid that is completely in view, with dark dots on bright ground or bright ones on dark.
 pub fn find(image: &Image, board: &BoardSpec, _options: &FindOptions) -> Result<BoardView> {
     let BoardSpec::Circles { dots: [nx, ny], asymmetric, diameter_mm, .. } = board else {
         return Err(Fault::usage("the board is not a circle grid").next("describe it as type circles"));
@@ -34,11 +34,11 @@ pub fn find(image: &Image, board: &BoardSpec, _options: &FindOptions) -> Result<
         .flat_map(|j| (0..*nx as i32).map(move |i| (i, j)))
         .map(|(i, j)| {
             let (x, y) = if *asymmetric { (2 * i + j % 2, j) } else { (i, j) };
-            // Asymmetric dots form a square lattice that stands on its corner.
+            // Asymmetric dots form a square lattice that is rotated by 45 degrees.
             if *asymmetric { ((x + y).div_euclid(2), (y - x).div_euclid(2)) } else { (x, y) }
         })
         .collect();
-    // Of an asymmetric lattice only every other point (x + y even) exists: both sums are even.
+    // Of an asymmetric lattice only the points with even x + y exist, so both sums are even.
     let mut most = 0;
     for dark in [true, false] {
         let blobs = blobs(&grey, dark);
@@ -93,12 +93,13 @@ fn blobs(grey: &Grey, dark: bool) -> Vec<Blob> {
             continue;
         }
         let centre = sum / n;
-        // Second moments of a full ellipse are a quarter of its squared axes; 1/12 is the pixel's own.
+        // The second moments of a filled ellipse are a quarter of its squared semi-axes; 1/12 is the pixel's own
+        // moment.
         let moments = square / n - centre * centre.transpose();
         let axes = moments.symmetric_eigenvalues();
         let area = 4.0 * std::f64::consts::PI * (axes[0] * axes[1]).max(0.0).sqrt();
         let Some(inverse) = (moments * 4.0).try_inverse() else { continue };
-        // A filled ellipse has the area that its moments tell; squares miss it by 5 %, crosses and rings by more.
+        // The area of a filled ellipse follows from its moments; squares deviate by 5 %, crosses and rings by more.
         if (area / n - 1.0).abs() < 0.08 && axes.max() < 16.0 * axes.min() {
             found.push(Blob { centre, shape: inverse });
         }
@@ -106,7 +107,7 @@ fn blobs(grey: &Grey, dark: bool) -> Vec<Blob> {
     found
 }
 
-/// Pixels that differ from the mean of their surroundings (an eighth of the picture) by a fifth of it.
+/// Pixels that differ from the mean of their surroundings (an eighth of the picture) by a fifth of that mean.
 pub(super) fn mask(grey: &Grey, dark: bool) -> Vec<bool> {
     let (w, h) = (grey.width, grey.height);
     let mut sums = vec![0.0f64; (w + 1) * (h + 1)];
@@ -132,8 +133,8 @@ pub(super) fn mask(grey: &Grey, dark: bool) -> Vec<bool> {
     mask
 }
 
-/// Blobs in the order of the nodes, and whether another turn would do too. Lattices are grown from the
-/// blobs nearest to the middle: at the rim the first steps may be diagonals.
+/// Blobs in the order of the nodes, and whether another rotation fits too. Lattices are grown from the blobs closest
+/// to the middle, because at the rim the first steps may be diagonals.
 fn labelled(blobs: &[Blob], nodes: &[Node]) -> Option<(Vec<usize>, bool)> {
     let middle = blobs.iter().map(|b| b.centre).sum::<Vec2>() / blobs.len().max(1) as f64;
     let mut seeds: Vec<usize> = (0..blobs.len()).collect();
@@ -142,7 +143,7 @@ fn labelled(blobs: &[Blob], nodes: &[Node]) -> Option<(Vec<usize>, bool)> {
     seeds.into_iter().take(30).find_map(|seed| matching(&grow(blobs, seed), nodes, blobs))
 }
 
-/// Blobs reached from a seed by walking from neighbour to neighbour: lattice coordinate to blob.
+/// Blobs reached from a seed by steps between neighbours: lattice coordinate to blob.
 fn grow(blobs: &[Blob], seed: usize) -> HashMap<Node, usize> {
     let nearest = |p: &Vec2, without: usize| {
         let others = blobs.iter().enumerate().filter(|(i, _)| *i != without);
@@ -153,7 +154,7 @@ fn grow(blobs: &[Blob], seed: usize) -> HashMap<Node, usize> {
     near.sort_by(|a, b| a.norm().total_cmp(&b.norm()));
     let cross = |a: &Vec2, b: &Vec2| a.x * b.y - a.y * b.x;
     let Some(&u) = near.first() else { return HashMap::new() };
-    // The second step turns right from the first by a half to one and a half right angles.
+    // The second step points to the right of the first, at an angle of 37 to 143 degrees.
     let Some(&v) = near.iter().take(8).find(|d| cross(&u, d) > 0.6 * u.norm() * d.norm()) else {
         return HashMap::new();
     };
@@ -172,7 +173,7 @@ fn grow(blobs: &[Blob], seed: usize) -> HashMap<Node, usize> {
                 continue;
             }
             let seen = (blobs[b].centre - here) * f64::from(di + dj);
-            // Steps follow the perspective.
+            // The steps are updated to follow the perspective.
             let (nu, nv) = if di != 0 { (seen, v) } else { (u, seen) };
             map.insert(node, b);
             queue.push_back((node, nu, nv));
@@ -181,7 +182,7 @@ fn grow(blobs: &[Blob], seed: usize) -> HashMap<Node, usize> {
     map
 }
 
-/// The turn and shift that put every wanted node on a blob. Second: whether another turn would do too.
+/// Rotation and shift that assign a blob to every node. Second: whether another rotation fits too.
 fn matching(lattice: &HashMap<Node, usize>, nodes: &[Node], blobs: &[Blob]) -> Option<(Vec<usize>, bool)> {
     if lattice.len() != nodes.len() {
         return None;
@@ -207,9 +208,9 @@ fn matching(lattice: &HashMap<Node, usize>, nodes: &[Node], blobs: &[Blob]) -> O
     found.into_iter().next().map(|ids| (ids, ambiguous))
 }
 
-/// The image of a circle's centre is not the centre of its image: with the board's homography H the
-/// circle's conic C becomes H⁻ᵀCH⁻¹, whose centre tells the difference (docs/math.md, Corners (5)). A radius that is
-/// not stated is measured; second: the radius.
+/// The image of a circle's centre is not the centre of the circle's image. With the board's homography H the circle's
+/// conic C becomes H⁻ᵀCH⁻¹, whose centre gives the difference (docs/math.md, Corners (5)). A radius that is not
+/// stated is measured. Second: the radius.
 fn centred(dots: &[Dot], features: &[Vec3], stated: Option<f64>) -> Result<(Vec<BoardPoint>, f64)> {
     let plane: Vec<Vec2> = features.iter().map(|f| f.xy()).collect();
     let mut pixels: Vec<Vec2> = dots.iter().map(|d| d.pixel).collect();
@@ -232,8 +233,8 @@ fn centred(dots: &[Dot], features: &[Vec3], stated: Option<f64>) -> Result<(Vec<
     ))
 }
 
-/// The radius that makes the circles' images as large as the ellipses, in the median over the dots: areas change by
-/// the homography's determinant at a dot, for small dots, and the circle's image tells the rest.
+/// The radius at which the circles' images are as large as the ellipses, median over the dots. For small dots, areas
+/// change by the homography's determinant at the dot; the circle's exact image gives the remaining correction.
 fn measured_radius(h: &Mat3, dots: &[Dot], plane: &[Vec2]) -> f64 {
     let mut all: Vec<f64> = dots
         .iter()
@@ -248,7 +249,7 @@ fn measured_radius(h: &Mat3, dots: &[Dot], plane: &[Vec2]) -> f64 {
     all[all.len() / 2]
 }
 
-/// Centre of the circle's image minus image of its centre, px.
+/// Centre of the circle's image minus the image of its centre, px.
 fn eccentricity(h: &Mat3, x: &Vec2, radius: f64) -> Vec2 {
     let shift = Mat3::new(1.0, 0.0, x.x, 0.0, 1.0, x.y, 0.0, 0.0, 1.0);
     let g = h * shift;

@@ -1,4 +1,4 @@
-//! In: a picture and a first ellipse. Out: the ellipse's centre to a few hundredths of a pixel
+//! In: a picture and the start values of an ellipse. Out: the ellipse's centre to a few hundredths of a pixel
 //! (docs/math.md, Corners (4) and (5)).
 //! Frame and unit: pixels; grey levels.
 
@@ -13,15 +13,15 @@ pub struct Dot {
     pub pixel: Vec2,
     /// Standard deviation per axis, px.
     pub sigma_px: f64,
-    /// A of the ellipse qᵀAq = 1 that its edge is, 1/px².
+    /// A of the ellipse qᵀAq = 1 along the dot's edge, 1/px².
     pub shape: Matrix2<f64>,
 }
 
 const PARAMETERS: usize = 10;
 
-/// Fits a blurred elliptic edge: I = (1 + g·q) (m + c erf(d/√2s)), d the distance from qᵀAq = 1 to first
-/// order. `shape` is A of the start (1/px²). The pattern is symmetric about the centre for any
-/// symmetric blur. `None` where the picture shows no such edge.
+/// Fits a blurred elliptic edge: I = (1 + g·q) (m + c erf(d/√2s)), with d the distance from qᵀAq = 1 to first order.
+/// `shape` is the start value of A (1/px²). Any symmetric blur keeps the pattern symmetric about the centre. `None`
+/// if the picture shows no such edge.
 pub fn dot(grey: &Grey, start: &Vec2, shape: &Matrix2<f64>) -> Option<Dot> {
     let covariance = shape.try_inverse()?;
     let reach = 1.5;
@@ -56,7 +56,7 @@ fn model(p: &[f64; PARAMETERS], x: f64, y: f64, j: &mut [f64; PARAMETERS]) -> f6
     let (dx, dy) = (x - p[0], y - p[1]);
     let (gx, gy) = (p[2] * dx + p[3] * dy, p[3] * dx + p[4] * dy);
     let rho = (gx * dx + gy * dy).max(1e-12).sqrt();
-    // Slope of rho: A q / rho. Near the edge the distance is (rho - 1) over it.
+    // Slope of rho: |A q| / rho. Near the edge the distance is (rho - 1) divided by this slope.
     let slope = (gx.hypot(gy) / rho).max(1e-9);
     let d = (rho - 1.0) / slope;
     let inv = (-p[5]).exp() * std::f64::consts::FRAC_1_SQRT_2;

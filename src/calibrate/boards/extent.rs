@@ -1,17 +1,17 @@
-//! In: a board's layout and a point on it. Out: whether the point lies on the board, and how far
-//! it is from the next edge of the print.
+//! In: a board's layout and a point on it. Out: whether the point lies on the board, and its distance from the
+//! nearest edge of the print.
 //! Frame and unit: board frame, mm.
 
 use crate::recording::BoardSpec;
 
-/// Distance inside the board's outline, mm; negative outside.
+/// Distance to the board's outline, mm; positive inside, negative outside.
 pub fn inside(board: &BoardSpec, x: f64, y: f64) -> f64 {
     let [x0, y0, x1, y1] = board.outline();
     (x - x0).min(x1 - x).min(y - y0).min(y1 - y)
 }
 
-/// Distance to the nearest border between dark and bright print, mm: a stripe or spot across such
-/// a border is pulled towards the bright side.
+/// Distance to the nearest border between dark and bright print, mm. A stripe or spot across such a border is pulled
+/// towards the bright side.
 pub fn to_print_edge(board: &BoardSpec, x: f64, y: f64) -> f64 {
     match board {
         BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm: s, .. } => {
@@ -25,20 +25,20 @@ pub fn to_print_edge(board: &BoardSpec, x: f64, y: f64) -> f64 {
             let on_board = u > 0.0 && v > 0.0 && u < nx && v < ny;
             let white = (u.floor() as i64 + v.floor() as i64).rem_euclid(2) == i64::from(!board.begins_white());
             if on_board && white {
-                // The marker's own cells are all edges: only the rim around it is plain.
+                // The marker's cells are full of edges: only the margin around it is plain.
                 let (a, b) = ((u.fract() - 0.5).abs(), (v.fract() - 0.5).abs());
                 square.min((a.max(b) * s - marker_mm / 2.0).max(0.0))
             } else {
                 square
             }
         }
-        // A marker's own cells are all edges: only the white round the markers is plain.
+        // A marker's cells are full of edges: only the white around the markers is plain.
         BoardSpec::MarkerGrid { marker_mm, .. } => {
             let out = |d: f64| (-d).max(d - marker_mm).max(0.0);
             let first = board.features().into_iter().step_by(4);
             first.map(|c| out(x - c.x).hypot(out(y - c.y))).fold(f64::INFINITY, f64::min)
         }
-        // Dots of unknown size: no place near them is known to be plain.
+        // Dots of unknown size: no position near them is known to be plain.
         BoardSpec::Circles { diameter_mm: None, .. } => 0.0,
         BoardSpec::Circles { diameter_mm: Some(d), .. } => {
             board.features().iter().map(|c| ((x - c.x).hypot(y - c.y) - d / 2.0).abs()).fold(f64::INFINITY, f64::min)
@@ -46,7 +46,7 @@ pub fn to_print_edge(board: &BoardSpec, x: f64, y: f64) -> f64 {
     }
 }
 
-/// Distance to the lines of the unit grid inside a rectangle, and to the rectangle itself from outside.
+/// Distance to the lines of the unit grid inside a rectangle; from outside, to the rectangle.
 fn to_lines(u: f64, v: f64, u0: f64, u1: f64, v0: f64, v1: f64) -> f64 {
     let outside = (u0 - u).max(u - u1).max(0.0).hypot((v0 - v).max(v - v1).max(0.0));
     if outside > 0.0 {

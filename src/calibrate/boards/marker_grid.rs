@@ -1,6 +1,6 @@
-//! In: a picture and the description of ArUco or AprilTag markers, one or a grid of them. Out: the corners of those
-//! that are in view with their ids, or why there are none.
-//! Frame and unit: pixels; ids four a marker, clockwise from its upper left corner, markers row by row.
+//! In: a picture and the description of ArUco or AprilTag markers, one or a grid of them. Out: the corners of the
+//! visible markers with their ids, or the reason why there are none.
+//! Frame and unit: pixels; four ids per marker, clockwise from its upper left corner, markers row by row.
 
 use super::circles::mask;
 use super::quads::{QuadCorner, quads, refined};
@@ -13,16 +13,16 @@ use crate::raster::Image;
 use crate::recording::{BoardSpec, Markers};
 use calib_targets_aruco::Matcher;
 
-/// Cells of a marker's black ring that must be read as black.
+/// Smallest share of the cells in a marker's black ring that must be read as black.
 const RING: f64 = 0.9;
 
-/// A marker that was read: its place in the board's order, and its corners from its own upper left on.
+/// A decoded marker: its index in the board's order, and its corners, starting with its own upper left.
 struct Seen {
     place: usize,
     corners: [QuadCorner; 4],
 }
 
-/// Finds the markers of a board, of which any number may be in view.
+/// Finds the markers of a board; any number of them may be in view.
 pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<BoardView> {
     let markers = Markers::of(board)?
         .ok_or_else(|| Fault::usage("the board has no markers").next("describe it as type marker_grid"))?;
@@ -63,11 +63,11 @@ pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<B
     Ok(BoardView { points, ..BoardView::default() })
 }
 
-/// The marker in a quadrilateral, if it is one of the board's.
+/// Decodes the marker in a quadrilateral; `None` if it is not one of the board's.
 fn read(grey: &Grey, quad: &[Vec2; 4], markers: &Markers, matcher: &Matcher) -> Option<Seen> {
     let cells = markers.cells();
     let n = cells as f64;
-    // The black ring is one cell wide, the white ground round it as wide at least; the start is a pixel off.
+    // The black ring is one cell wide, the white margin around it at least as wide; the start is accurate to a pixel.
     let corners = refined(grey, quad, 0.55 / n)?;
     let square = [[0.0, 0.0], [n, 0.0], [n, n], [0.0, n]].map(Vec2::from);
     let h = homography(&square, &corners.map(|c| c.pixel))?;
@@ -85,12 +85,13 @@ fn read(grey: &Grey, quad: &[Vec2; 4], markers: &Markers, matcher: &Matcher) -> 
     let code = bits.enumerate().fold(0u64, |code, (bit, k)| code | u64::from(black(k)) << bit);
     let found = matcher.match_code(code)?;
     let place = markers.places().position(|(_, _, id)| id == found.id as usize)?;
-    // The marker appears turned clockwise by `rotation` quarters: its upper left is that many corners on.
+    // The marker appears rotated clockwise by `rotation` quarter turns; its upper left corner is shifted by as many
+    // indices.
     let turn = found.rotation as usize;
     Some(Seen { place, corners: std::array::from_fn(|k| corners[(k + turn) % 4]) })
 }
 
-/// Mean light of the middle of each cell.
+/// Mean intensity in the middle of each cell.
 fn cell_levels(grey: &Grey, h: &Mat3, cells: usize) -> Option<Vec<f64>> {
     let spots = [-0.2, 0.0, 0.2];
     (0..cells * cells)
@@ -103,7 +104,7 @@ fn cell_levels(grey: &Grey, h: &Mat3, cells: usize) -> Option<Vec<f64>> {
         .collect()
 }
 
-/// Drops markers that were read twice, worse ones first, and those that are not where the others put them.
+/// Removes duplicates of markers, keeping the more accurate one, and markers that contradict their neighbours.
 fn keep_agreeing(seen: &mut Vec<Seen>, features: &[Vec2]) {
     seen.sort_by(|a, b| {
         let sigma = |s: &Seen| s.corners.iter().map(|c| c.sigma_px).sum::<f64>();
@@ -118,9 +119,9 @@ fn keep_agreeing(seen: &mut Vec<Seen>, features: &[Vec2]) {
         off_px(seen, features, i)[3] / (s.corners[0].pixel - s.corners[2].pixel).norm()
     };
     let good: Vec<bool> = (0..seen.len()).map(|i| off(i) < 0.4).collect();
-    // A wrong neighbour spoils good ones, so that one marker's word is not enough; but where most disagree none is
-    // believed. Some markers are their own mirror image (DICT_4X4_50: 8, 9, 17) and are read in a mirrored picture,
-    // each the wrong way round.
+    // A wrong neighbour also makes good markers disagree, so one marker's disagreement is not enough. If at most half
+    // of the markers agree, all are rejected. Some markers are their own mirror image (DICT_4X4_50: 8, 9, 17) and are
+    // decoded in a mirrored picture, each in a wrong orientation.
     if good.iter().filter(|g| **g).count() * 2 <= seen.len() {
         seen.clear();
         return;
@@ -130,8 +131,8 @@ fn keep_agreeing(seen: &mut Vec<Seen>, features: &[Vec2]) {
     drop_covered(seen, features);
 }
 
-/// How far a marker's corners are from where the three markers nearest on the board put them, px, ascending: a lens
-/// bends less over so short a way.
+/// Distances of a marker's corners from the positions predicted by the three nearest markers on the board, px,
+/// ascending. Over such a short distance a lens bends less.
 fn off_px(seen: &[Seen], features: &[Vec2], i: usize) -> [f64; 4] {
     let middle = |s: &Seen| features[4 * s.place] + features[4 * s.place + 2];
     let mut others: Vec<usize> = (0..seen.len()).filter(|k| *k != i).collect();
@@ -151,8 +152,8 @@ fn off_px(seen: &[Seen], features: &[Vec2], i: usize) -> [f64; 4] {
     off
 }
 
-/// Drops, worst first, markers of which a corner stands out against what their neighbours say, and against their own
-/// other corners: something covers it. A lens, or a neighbour that is wrong itself, puts all four off.
+/// Removes, worst first, covered markers: those with a corner that stands out both against the neighbours' prediction
+/// and against the marker's other corners. A lens, or a wrong neighbour, would shift all four corners.
 fn drop_covered(seen: &mut Vec<Seen>, features: &[Vec2]) {
     while seen.len() > 4 {
         let off: Vec<[f64; 4]> = (0..seen.len()).map(|i| off_px(seen, features, i)).collect();
@@ -167,8 +168,9 @@ fn drop_covered(seen: &mut Vec<Seen>, features: &[Vec2]) {
     }
 }
 
-/// Times the middle marker's distance from where its neighbours put it, with the least such distance that is
-/// believed, px; and times the marker's own second best corner's: two of the four may be covered.
+/// A corner stands out beyond this multiple of the median marker's distance from its neighbours' prediction, which
+/// counts as at least `LEAST_OFF_PX` px. It must also exceed `AGAINST_OWN` times the marker's own second smallest
+/// distance: two of the four corners may be covered.
 const STANDS_OUT: f64 = 4.0;
 const LEAST_OFF_PX: f64 = 0.25;
 const AGAINST_OWN: f64 = 6.0;

@@ -1,4 +1,4 @@
-//! In: pictures and descriptions of boards. Out: the boards' features, sub-pixel, with sigmas; boards to print.
+//! In: pictures and descriptions of boards. Out: the boards' features, sub-pixel, with sigmas; printable boards.
 //! Frame and unit: pixels (centres at integers); feature ids index `BoardSpec::features()`.
 
 mod chess;

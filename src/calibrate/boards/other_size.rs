@@ -1,16 +1,17 @@
-//! Pictures of a board that was described with a wrong size: three that agree about another one tell it, the others
-//! need not be searched. A picture without its board costs many times what one with it does.
+//! Pictures of a board that was described with a wrong size. If three of them agree on another size, the others need
+//! not be searched. A failed search costs many times as much as a successful one.
 
 use crate::fault::{Fault, Result};
 use rayon::prelude::*;
 
-/// The cause that a picture's fault names where its board is whole and of another size; its next step names the size.
+/// Cause of the fault for a picture that shows a complete board of another size; the fault's next step names that
+/// size.
 pub const WRONG_SIZE: &str = "wrong board size given";
-/// So many pictures must agree.
+/// Number of pictures that must agree on another size.
 const AGREE: usize = 3;
 
-/// Looks at pictures 0 to `count`, side by side. It ends early where none has shown the board and three agree about
-/// another size: then there are fewer results than pictures.
+/// Looks at pictures 0 to `count` in parallel. It ends early if none has shown the board and three agree on another
+/// size; then there are fewer results than pictures.
 pub fn look_at_all<T: Send>(count: usize, look: impl Fn(usize) -> Result<T> + Sync) -> Vec<Result<T>> {
     let some = |from: usize, to: usize| (from..to).into_par_iter().map(&look).collect::<Vec<_>>();
     let mut seen: Vec<Result<T>> = Vec::new();
@@ -34,7 +35,7 @@ mod tests {
     use super::*;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    /// How many of 20 pictures are looked at where picture i says what `says` has of it.
+    /// Number of pictures, of 20, that are looked at if picture i gives the result `says(i)`.
     fn looked_at(says: impl Fn(usize) -> Result<()> + Sync) -> usize {
         let count = AtomicUsize::new(0);
         let seen = look_at_all(20, |i| {

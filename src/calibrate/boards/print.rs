@@ -1,4 +1,4 @@
-//! In: a board's description. Out: the board to be printed at true scale, as SVG and PDF.
+//! In: a board's description. Out: the board for printing at true scale, as SVG and PDF.
 //! Frame and unit: millimetres on the sheet, x to the right, y down.
 
 use crate::fault::{Fault, Result};
@@ -8,19 +8,19 @@ use std::fmt::Write;
 /// Black shapes on a white sheet.
 #[derive(Clone, Debug, Default)]
 pub struct Sheet {
-    /// Across the sheet, mm: the board with its border.
+    /// Width of the sheet, mm: the board with its border.
     pub width: f64,
-    /// Down the sheet, mm: the board with its border, and 12 mm for label and rule.
+    /// Height of the sheet, mm: the board with its border, and 12 mm for label and rule.
     pub height: f64,
-    /// x, y, width, height.
+    /// Black rectangles: x, y, width, height, mm.
     pub rectangles: Vec<[f64; 4]>,
-    /// centre x, y, radius.
+    /// Black discs: centre x, y, radius, mm.
     pub discs: Vec<[f64; 3]>,
-    /// Under the board, outside its border.
+    /// Text under the board, outside its border.
     pub label: String,
 }
 
-/// Space under the board for the label and a 100 mm rule to check the printer with.
+/// Space under the board for the label and a 100 mm rule that shows the printer's scale, mm.
 const FOOT: f64 = 12.0;
 
 /// Draws a board.
@@ -98,7 +98,7 @@ fn bad(what: String, next: &str) -> Result<()> {
     Err(Fault::usage(what).cause("a slip of typing, or another unit than mm").next(next))
 }
 
-/// Markers fit in their squares with white around them, dots in their pitch.
+/// Checks that markers fit in their squares with white around them, and dots in their pitch.
 fn fits(board: &BoardSpec) -> Result<()> {
     match board {
         BoardSpec::Charuco { square_mm, marker_mm, .. } if !(*marker_mm > 0.0 && *marker_mm < 0.95 * square_mm) => bad(
@@ -108,7 +108,7 @@ fn fits(board: &BoardSpec) -> Result<()> {
             ),
             "choose markers of 0.5 to 0.8 of the square",
         ),
-        // A white margin of a cell, or its edges are not seen.
+        // Without a white margin of about a cell the marker's edges are not visible.
         BoardSpec::MarkerGrid { markers, marker_mm, gap_mm, border_mm, .. }
             if (markers != &[1, 1] && *gap_mm < 0.15 * marker_mm) || *border_mm < 0.15 * marker_mm =>
         {
@@ -139,7 +139,7 @@ fn squares(sheet: &mut Sheet, nx: u32, ny: u32, s: f64, x0: f64, y0: f64, odd: u
     sheet.rectangles.extend(black.map(|(i, j)| [x0 + f64::from(i) * s, y0 + f64::from(j) * s, s, s]));
 }
 
-/// Runs of black cells become one rectangle: no hairlines between cells in print.
+/// Runs of black cells become one rectangle, so that the print has no hairlines between cells.
 fn markers(sheet: &mut Sheet, all: &Markers, [x0, y0]: [f64; 2]) {
     let cell = all.cell_mm();
     for (i, j, k) in all.places() {
@@ -188,7 +188,7 @@ impl Sheet {
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}mm\" height=\"{h}mm\" viewBox=\"0 0 {w} {h}\">\
              <rect width=\"{w}\" height=\"{h}\" fill=\"#fff\"/>"
         );
-        // One path: neighbours that touch leave no seam between them.
+        // One path: adjacent rectangles leave no seam between them.
         out.push_str("<path d=\"");
         for [x, y, w, h] in &self.rectangles {
             let _ = write!(out, "M{x:.5} {y:.5}h{w:.5}v{h:.5}h{:.5}z", -w);
@@ -220,7 +220,7 @@ impl Sheet {
         for [x, y, r] in &self.discs {
             disc(&mut draw, x * k, flip(*y), r * k);
         }
-        // Helvetica's digits and letters are about half as wide as high.
+        // Characters of Helvetica are about half as wide as high.
         let left = (self.width / 2.0 - self.label.len() as f64 * 2.6 * 0.25) * k;
         let _ = writeln!(
             draw,

@@ -1,12 +1,12 @@
 //! In: a picture. Out: dark quadrilaterals on bright ground, and their corners to a few hundredths of a pixel with
-//! sigma, from straight lines through the edges near each corner.
+//! sigma, from straight lines fitted to the edges near each corner.
 //! Frame and unit: pixels (centres at integers); corners run clockwise in the picture.
 
 use super::refine::Grey;
 use crate::geometry::Vec2;
 use nalgebra::Matrix2;
 
-/// A corner as the crossing of two fitted lines.
+/// A corner as the intersection of two fitted lines.
 #[derive(Clone, Copy, Debug)]
 pub struct QuadCorner {
     pub pixel: Vec2,
@@ -14,14 +14,16 @@ pub struct QuadCorner {
     pub sigma_px: f64,
 }
 
-/// Share of a quadrilateral that the convex hull of its patch fills at least; a disc fills 0.79 of one.
+/// Smallest share of a quadrilateral that the convex hull of its patch must fill; a disc fills 0.79 of its own.
 const FILLED: f64 = 0.88;
-/// Shortest side, px: a marker of six cells has cells of 1.5 px then.
+/// Shortest side, px: the cells of a marker with six cells per side are then 1.5 px wide.
 const SHORTEST: f64 = 9.0;
-/// Farthest that a corner's lines follow the edges, px: beyond it the lens bends them measurably.
+/// Longest part of an edge from a corner that its line is fitted to, px: over a longer one the lens bends the edge
+/// measurably.
 const LONGEST: f64 = 40.0;
 
-/// Quadrilaterals whose inside is dark at the rim, the surroundings brighter; to a pixel or two.
+/// Quadrilaterals that are dark inside their rim and surrounded by brighter ground; corners accurate to a pixel or
+/// two.
 pub fn quads(mask: &[bool], width: usize, height: usize) -> Vec<[Vec2; 4]> {
     let mut seen = vec![false; mask.len()];
     let (mut found, mut stack) = (Vec::new(), Vec::new());
@@ -31,7 +33,7 @@ pub fn quads(mask: &[bool], width: usize, height: usize) -> Vec<[Vec2; 4]> {
         }
         stack.push(first);
         seen[first] = true;
-        // Leftmost and rightmost pixel of each row are all that the hull needs.
+        // The hull needs only the leftmost and rightmost pixel of each row.
         let mut rows: std::collections::BTreeMap<usize, [usize; 2]> = std::collections::BTreeMap::new();
         let mut border = false;
         while let Some(k) = stack.pop() {
@@ -86,8 +88,9 @@ fn area(p: &[Vec2]) -> f64 {
     (0..n).map(|i| p[i].x * p[(i + 1) % n].y - p[i].y * p[(i + 1) % n].x).sum::<f64>() / 2.0
 }
 
-/// The four corners of a hull that is one. Pixels cut corners off: each is two of the hull's points or three, and the
-/// longest edge between one corner's and the next one's is the side, which is carried on to where the sides meet.
+/// The four corners of a hull, if it is a quadrilateral. Pixels cut its corners off, so that each consists of two or
+/// three points of the hull. The longest edge between two corners is a side; adjacent sides are extended until they
+/// intersect.
 fn quadrilateral(hull: &[Vec2]) -> Option<[Vec2; 4]> {
     let near = largest(hull)?;
     let sides: [[Vec2; 2]; 4] = std::array::from_fn(|k| {
@@ -102,22 +105,22 @@ fn quadrilateral(hull: &[Vec2]) -> Option<[Vec2; 4]> {
     }
     let lengths = (0..4).map(|i| (four[(i + 1) % 4] - four[i]).norm());
     let good = lengths.fold(f64::INFINITY, f64::min) >= SHORTEST && area(hull) >= FILLED * area(&four).abs();
-    // The hull runs through the pixels' centres: half a pixel is missing on each side.
+    // The hull runs through the centres of the pixels, so half a pixel is missing on each side.
     let middle = four.iter().sum::<Vec2>() / 4.0;
     good.then(|| four.map(|p| p + (p - middle).normalize() * std::f64::consts::FRAC_1_SQRT_2))
 }
 
-/// Where the lines through two pairs of points meet.
+/// Intersection of the lines through two pairs of points.
 fn meet(a: &[Vec2; 2], b: &[Vec2; 2]) -> Option<Vec2> {
     let (u, v) = (a[1] - a[0], b[1] - b[0]);
     let cross = u.x * v.y - u.y * v.x;
     let between = b[0] - a[0];
-    // Lines within half a degree of each other meet nowhere near.
+    // Lines within half a degree of each other have no usable intersection.
     (cross.abs() > 0.01 * u.norm() * v.norm()).then(|| a[0] + u * ((between.x * v.y - between.y * v.x) / cross))
 }
 
-/// Which four of a convex hull's points enclose most: of every diagonal, the point farthest from it on each side.
-/// That point moves on with the diagonal's end, so that all of it takes as many steps as there are diagonals.
+/// Indices of the four points of a convex hull that enclose the largest area: for every diagonal, the farthest point
+/// on each side. These points advance with the diagonal's end, so the search for one start point takes linear time.
 fn largest(hull: &[Vec2]) -> Option<[usize; 4]> {
     let n = hull.len();
     let (mut best, mut most) = (None, 0.0);
@@ -143,17 +146,18 @@ fn largest(hull: &[Vec2]) -> Option<[usize; 4]> {
     best
 }
 
-/// The corners of a quadrilateral by lines through its edges. `clear`: how far from the edge, on both sides, the
-/// picture shows nothing else, as a share of the side that the edge is seen across.
+/// The corners of a quadrilateral by lines along its edges. `clear`: width beside an edge, on both sides, without
+/// other structures, as a share of the length of the adjacent side.
 pub fn refined(grey: &Grey, quad: &[Vec2; 4], clear: f64) -> Option<[QuadCorner; 4]> {
     let mut now = *quad;
     let mut out = None;
-    // The second round looks across the edges where the first has found them.
+    // The second round starts from the edges that the first one found.
     for _ in 0..2 {
         let mut corners = Vec::new();
         for k in 0..4 {
             let (before, here, after) = (now[(k + 3) % 4], now[k], now[(k + 1) % 4]);
-            // Across the side to `after` one looks along the side to `before`, and the other way round.
+            // The edge along the side to `after` is searched in the direction of the side to `before`, and vice
+            // versa.
             let first = line(grey, &here, &after, clear * (before - here).norm())?;
             let second = line(grey, &here, &before, clear * (after - here).norm())?;
             corners.push(crossing(&first, &second)?);
@@ -169,7 +173,7 @@ pub fn refined(grey: &Grey, quad: &[Vec2; 4], clear: f64) -> Option<[QuadCorner;
     out
 }
 
-/// A line near a corner: distance from it along `normal` is a + b s, s along `along` from `origin`.
+/// A line near a corner: its points are origin + s along + (a + b s) normal.
 struct Line {
     origin: Vec2,
     along: Vec2,
@@ -186,7 +190,7 @@ fn line(grey: &Grey, corner: &Vec2, end: &Vec2, clear_px: f64) -> Option<Line> {
     let along = (end - corner) / length;
     let normal = Vec2::new(-along.y, along.x);
     let reach = clear_px.clamp(1.5, 5.0);
-    // The tip is rounded by blur, and the other edge reaches into it.
+    // The tip of the corner is rounded by blur, and the other edge reaches into it.
     let (from, to) = ((0.12 * length).clamp(1.5, 6.0), (0.6 * length).min(LONGEST));
     let places: Vec<(f64, f64)> = (0..)
         .map(|i| from + f64::from(i))
@@ -216,31 +220,31 @@ fn line(grey: &Grey, corner: &Vec2, end: &Vec2, clear_px: f64) -> Option<Line> {
     }
     let residuals: Vec<f64> = places.iter().map(|p| p.1 - a - b * p.0).collect();
     let square = residuals.iter().map(|r| r * r).sum::<f64>();
-    // Places one pixel apart share pixels: their errors hang together.
+    // Positions one pixel apart share pixels, so their errors are correlated.
     let shared = residuals.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / square.max(1e-12);
     let variance = square / (n - 2.0) * (1.0 + 2.0 * shared.clamp(0.0, 1.0)) * gain;
     Some(Line { origin: *corner, along, normal, a, b, variance })
 }
 
-/// Signed distance along `normal` from `at` to the edge: where the light crosses half way between both sides.
+/// Signed distance along `normal` from `at` to the edge, which is the centroid of the intensity's slope.
 fn edge(grey: &Grey, at: &Vec2, normal: &Vec2, reach: f64) -> Option<f64> {
     const STEP: f64 = 0.5;
     let half = (reach / STEP).round() as i32;
     let light =
         (-half..=half).map(|k| grey.at(&(at + normal * (f64::from(k) * STEP)))).collect::<Option<Vec<f64>>>()?;
-    // The edge's place is the mean of the slope, which a symmetric blur leaves where it is.
+    // The edge's position is the mean of the slope, which a symmetric blur does not change.
     let slopes: Vec<f64> = light.windows(2).map(|w| w[1] - w[0]).collect();
     let total: f64 = slopes.iter().sum();
     let place = |i: usize| (i as f64 + 0.5 - f64::from(half)) * STEP;
     let mean = slopes.iter().enumerate().map(|(i, s)| s * place(i)).sum::<f64>() / total;
     let rough: f64 = slopes.iter().map(|s| s.abs()).sum();
-    // Where light goes up and down again, or hardly changes, there is no edge.
+    // If the intensity rises and falls again, or hardly changes, there is no edge.
     (total.abs() > 0.5 * rough && total.abs() > 4.0 && mean.abs() < reach).then_some(mean)
 }
 
-/// Where two lines cross, with the sigma that their own sigmas make.
+/// Intersection of two lines, with the sigma that follows from their sigmas.
 fn crossing(p: &Line, q: &Line) -> Option<QuadCorner> {
-    // A point x is on a line where n·(x − origin) = a + b (along·(x − origin)).
+    // A point x is on a line if n·(x − origin) = a + b (along·(x − origin)).
     let row = |l: &Line| l.normal - l.along * l.b;
     let (r1, r2) = (row(p), row(q));
     let m = Matrix2::new(r1.x, r1.y, r2.x, r2.y).try_inverse()?;
@@ -265,7 +269,7 @@ mod tests {
         assert!(quadrilateral(&hull(disc)).is_none());
     }
 
-    /// Squares of 12 to 40 px as pixels show them, every way round and at every place in the pixel.
+    /// Squares of 12 to 40 px in pixels, at many rotations and sub-pixel positions.
     #[test]
     fn corners_that_pixels_cut_off_are_where_they_are() {
         let (mut worst, mut sum) = (0.0f64, 0.0);
@@ -286,7 +290,7 @@ mod tests {
         }
         let rms = (sum / 8000.0f64).sqrt();
         println!("corners off by {rms:.2} px rms, {worst:.2} px at most");
-        // `refined` looks 1.5 px and more to both sides of an edge.
+        // `refined` searches at least 1.5 px on both sides of an edge.
         assert!(rms < 1.0 && worst < 2.5, "{rms:.2} px, {worst:.2} px");
     }
 }

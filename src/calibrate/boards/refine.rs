@@ -1,18 +1,18 @@
-//! In: a picture, a corner to within a pixel or two, the grid's directions there. Out: the corner to
-//! a few hundredths of a pixel with its sigma (docs/math.md, Corners (1) to (3)).
+//! In: a picture, a corner to within a pixel or two, the grid's directions there. Out: the corner to a few hundredths
+//! of a pixel with its sigma (docs/math.md, Corners (1) to (3)).
 //! Frame and unit: pixels; grey levels.
 
 use super::sandwich::place_variance;
 use crate::geometry::Vec2;
 use nalgebra::{SMatrix, SVector};
 
-/// A grey picture as the fits want it.
+/// A grey picture in the form that the fits use.
 pub struct Grey {
     /// Columns, px.
     pub width: usize,
     /// Rows, px.
     pub height: usize,
-    /// Grey levels as the picture has them, row by row from the top left.
+    /// Grey levels of the picture, row by row from the top left.
     pub levels: Vec<f32>,
 }
 
@@ -31,7 +31,7 @@ impl Grey {
         };
         Grey { width, height, levels: (0..width * height).map(mean).collect() }
     }
-    /// Bilinear; `None` outside.
+    /// Bilinear interpolation; `None` outside the picture.
     pub fn at(&self, p: &Vec2) -> Option<f64> {
         let (x, y) = (p.x.floor(), p.y.floor());
         if !(x >= 0.0 && y >= 0.0 && x + 1.0 < self.width as f64 && y + 1.0 < self.height as f64) {
@@ -48,37 +48,36 @@ impl Grey {
 /// A refined corner.
 #[derive(Clone, Copy, Debug)]
 pub struct Corner {
-    /// Where it is, px.
+    /// Position, px.
     pub pixel: Vec2,
-    /// Standard deviation per axis, px, from the pixels' own residuals.
+    /// Standard deviation per axis, px, from the residuals of the pixels.
     pub sigma_px: f64,
     /// Sigma of the edge blur, px.
     pub blur_px: f64,
-    /// Half the difference between white and black; positive where the quadrant between +u and +v
-    /// is bright.
+    /// Half the difference between white and black, grey levels; positive if the quadrant between +u and +v is
+    /// bright.
     pub contrast: f64,
 }
 
 /// Settings of [`corner`].
 #[derive(Clone, Copy, Debug)]
 pub struct Window {
-    /// Share of a square's side that the fit reaches along the edges from the corner; 0.2..0.48.
+    /// Length of the fit along the edges from the corner, as a share of a square's side; 0.2..0.48.
     pub reach: f64,
-    /// The same in px at most: beyond it the lens bends the edges measurably.
+    /// Upper limit of this length, px: over a longer one the lens bends the edges measurably.
     pub longest_px: f64,
-    /// Distance from the nearer edge, as a share of the square, beyond which pixels are left out:
-    /// 1 for plain squares, the marker's margin for ChArUco.
+    /// Distance from the nearer edge, as a share of the square, beyond which pixels are excluded: 1 for plain
+    /// squares, the marker's margin for ChArUco.
     pub margin: f64,
 }
 
 const PARAMETERS: usize = 9;
-/// Corners nearer to the picture's edge show too little of one of their squares, px.
+/// Corners closer than this to the picture's edge show too little of one of their squares, px.
 const RIM: f64 = 5.0;
 
-/// Fits two blurred edges that cross: I = (1 + g·x) (m + c E(d₁) E(d₂)) with d the signed
-/// distances from the edges and E a step blurred by a Gaussian and by the pixel. The pattern is symmetric about the
-/// corner for any symmetric blur, so that an imperfect blur model does not shift it. `u` and `v` are the steps to the
-/// next corners, px.
+/// Fits two blurred, crossing edges: I = (1 + g·x) (m + c E(d₁) E(d₂)) with d the signed distances from the edges and
+/// E a step blurred by a Gaussian and by the pixel. Any symmetric blur keeps the pattern symmetric about the corner,
+/// so an imperfect blur model does not shift the corner. `u` and `v` are the steps to the next corners, px.
 pub fn corner(grey: &Grey, start: &Vec2, u: &Vec2, v: &Vec2, window: &Window) -> Option<Corner> {
     let to_grid = nalgebra::Matrix2::from_columns(&[*u, *v]).try_inverse()?;
     let (lu, lv) = (u.norm(), v.norm());
@@ -87,7 +86,7 @@ pub fn corner(grey: &Grey, start: &Vec2, u: &Vec2, v: &Vec2, window: &Window) ->
     let half = u * ru;
     let other = v * rv;
     let (hx, hy) = (half.x.abs() + other.x.abs(), half.y.abs() + other.y.abs());
-    // A corner near the picture's edge is fitted to what is there of its window.
+    // A corner near the picture's edge is fitted to the visible part of its window.
     let (right, bottom) = (grey.width as f64 - 1.0, grey.height as f64 - 1.0);
     let (x0, x1) = ((start.x - hx).ceil().max(0.0), (start.x + hx).floor().min(right));
     let (y0, y1) = ((start.y - hy).ceil().max(0.0), (start.y + hy).floor().min(bottom));
@@ -114,8 +113,8 @@ pub fn corner(grey: &Grey, start: &Vec2, u: &Vec2, v: &Vec2, window: &Window) ->
     })
 }
 
-/// Model value and derivatives at (x, y); `widths` are the pixel's widths across the edges. Parameters: corner x y,
-/// edge angles 1 2, ln blur, mean m, contrast c, gain slopes gx gy.
+/// Model value and derivatives at (x, y); `widths` are the pixel's widths perpendicular to the edges. Parameters:
+/// corner x y, angles of edges 1 and 2, ln blur, mean m, contrast c, gain slopes gx gy.
 fn model(p: &[f64; PARAMETERS], widths: &[f64; 2], x: f64, y: f64, j: &mut [f64; PARAMETERS]) -> f64 {
     let (dx, dy) = (x - p[0], y - p[1]);
     let (s1, c1) = p[2].sin_cos();
@@ -143,9 +142,10 @@ fn model(p: &[f64; PARAMETERS], widths: &[f64; 2], x: f64, y: f64, j: &mut [f64;
 fn fit(pixels: &[[f64; 3]], u: &Vec2, v: &Vec2) -> Option<Corner> {
     let n = pixels.len() as f64;
     let mean = pixels.iter().map(|p| p[2]).sum::<f64>() / n;
-    // The first edge runs along u, the second along v: d1 d2 < 0 in the quadrant between +u and +v.
+    // The first edge runs along u, the second along v, so that d1 d2 < 0 in the quadrant between +u and +v.
     let (a1, a2) = (u.y.atan2(u.x), v.y.atan2(v.x));
-    // A square pixel seen across an edge at angle a is a trapezoid; its wider part is the box, the rest blur.
+    // The profile of a square pixel across an edge at angle a is a trapezoid. The longer projected side is modelled
+    // as the box; the rest counts as blur.
     let widths = [a1, a2].map(|a: f64| a.sin().abs().max(a.cos().abs()));
     let mut p = [0.0, 0.0, a1, a2, 0.0, mean, 0.0, 0.0, 0.0];
     p[6] = contrast(&p, &widths, pixels, mean);
@@ -176,7 +176,7 @@ fn fit(pixels: &[[f64; 3]], u: &Vec2, v: &Vec2) -> Option<Corner> {
     })
 }
 
-/// By projection on the start's own pattern.
+/// Contrast by projection on the pattern of the start values.
 fn contrast(p: &[f64; PARAMETERS], widths: &[f64; 2], pixels: &[[f64; 3]], mean: f64) -> f64 {
     let mut scratch = [0.0; PARAMETERS];
     let (mut top, mut bottom) = (0.0, 0.0);
@@ -188,7 +188,7 @@ fn contrast(p: &[f64; PARAMETERS], widths: &[f64; 2], pixels: &[[f64; 3]], mean:
     top / bottom
 }
 
-/// Least squares from a start: parameters, normal matrix and cost there. `limit` is the widest blur, px.
+/// Least squares from a start: parameters, normal matrix and cost at the end. `limit` is the widest blur, px.
 fn settle(
     mut p: [f64; PARAMETERS],
     widths: &[f64; 2],
@@ -207,7 +207,7 @@ fn settle(
         for i in 0..PARAMETERS {
             next[i] += step[i];
         }
-        // The blur stays between a sharp lens's pixel and half of a square.
+        // The blur stays between 0.1 px (a sharp lens) and `limit`.
         next[4] = next[4].clamp(0.1f64.ln(), limit.max(0.3).ln());
         let mut there = 0.0;
         let (h2, g2) = normal_equations(&next, widths, pixels, &mut there);
@@ -254,8 +254,8 @@ fn normal_equations(p: &[f64; PARAMETERS], widths: &[f64; 2], pixels: &[[f64; 3]
     (h, g)
 }
 
-/// A step from -1 to 1 blurred by a Gaussian of sigma `s` and a box of width `w`, with its derivatives by
-/// d and by ln s.
+/// A step from -1 to 1 blurred by a Gaussian of sigma `s` and a box of width `w`, with its derivatives by d and by ln
+/// s.
 fn edge(d: f64, w: f64, s: f64) -> (f64, f64, f64) {
     let k = std::f64::consts::SQRT_2 * s;
     let (a, b) = ((d + 0.5 * w) / k, (d - 0.5 * w) / k);
@@ -277,7 +277,7 @@ pub(super) fn erf(x: f64) -> (f64, f64) {
 mod tests {
     use super::*;
 
-    /// A corner drawn by 16 x 16 samples a pixel and blurred by the pixel alone.
+    /// A corner drawn with 16 x 16 samples per pixel, blurred only by the pixel.
     fn drawn(corner: Vec2, u: Vec2, v: Vec2) -> Grey {
         let m = nalgebra::Matrix2::from_columns(&[u, v]).try_inverse().unwrap();
         let mut levels = vec![0.0; 64 * 64];

@@ -1,19 +1,20 @@
-//! In: the pixels of a feature's fit, their residuals and derivatives. Out: how far the fitted place scatters,
-//! whatever the noise is like from pixel to pixel (docs/math.md, Corners (6)).
+//! In: the pixels of a feature's fit, their residuals and derivatives. Out: the variance of the fitted position,
+//! without an assumption that all pixels have the same noise (docs/math.md, Corners (6)).
 //! Frame and unit: pixels; grey levels.
 
 use nalgebra::SMatrix;
 
-/// Variance of the fitted place (parameters 0 and 1 of N), mean of both axes, px².
+/// Variance of the fitted position (parameters 0 and 1 of N), mean of both axes, px².
 ///
-/// The places' information comes from the pixels on the edges, and those are noisier than the plain ones: print
-/// is rough there, the blur is never quite the model's, and one pixel's light is its neighbour's too. With one
-/// variance for all pixels the sigma came out 1.65 times too small on rendered pictures. Each pixel's own
-/// residual stands for its noise, products with the eight neighbours for what they share; dividing by 1 - h
-/// undoes what the fit took of the residual (\[white80\], \[mackinnon85\]; neighbours as in \[conley99\]).
+/// The information about the position comes from the pixels on the edges, which are noisier than the plain ones.
+/// Print is rough there, the blur model is never exact, and neighbouring pixels share light. With one variance for
+/// all pixels, the sigma was 1.65 times too small on rendered pictures. Each pixel's own residual therefore stands
+/// for its noise, and products with the eight neighbours for the noise that they share. The division by 1 - h
+/// compensates for the part of the residual that the fit absorbed (\[white80\], \[mackinnon85\]; neighbours as in
+/// \[conley99\]).
 ///
-/// `pixels` hold x, y (whole steps apart) and grey; `at` gives a pixel's residual and derivatives, `inverse` is
-/// the inverse of the normal equations' matrix.
+/// `pixels` hold x, y (integer steps apart) and grey. `at` gives a pixel's residual and derivatives. `inverse` is the
+/// inverse of the matrix of the normal equations.
 pub fn place_variance<const N: usize>(
     pixels: &[[f64; 3]],
     inverse: &SMatrix<f64, N, N>,
@@ -22,7 +23,7 @@ pub fn place_variance<const N: usize>(
     let low = |axis: usize| pixels.iter().map(|p| p[axis]).fold(f64::INFINITY, f64::min);
     let high = |axis: usize| pixels.iter().map(|p| p[axis]).fold(f64::NEG_INFINITY, f64::max);
     let (x0, y0) = (low(0), low(1));
-    // A rim of one pixel, so that every pixel has its neighbours.
+    // A rim of one pixel, so that every pixel has eight neighbours.
     let (width, height) = ((high(0) - x0).round() as usize + 3, (high(1) - y0).round() as usize + 3);
     let mut pull = vec![[0.0f64; 2]; width * height];
     let place = |p: &[f64; 3]| ((p[1] - y0).round() as usize + 1) * width + (p[0] - x0).round() as usize + 1;
@@ -50,7 +51,8 @@ pub fn place_variance<const N: usize>(
             }
         }
     }
-    // Neighbours of opposite noise (sharpening) are not believed to make a place better than its pixels.
+    // Neighbours with opposite noise (sharpening) must not make a position more certain than independent pixels
+    // would.
     0.5 * shared.max(own)
 }
 
@@ -60,7 +62,7 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// The shift of a known pattern, fitted by least squares, over its reported sigma: rms of many.
+    /// rms of the shift of a known pattern, fitted by least squares, over its reported sigma.
     fn pull(noise: impl Fn(&mut rand_pcg::Pcg64) -> Vec<f64>) -> f64 {
         let slope = |x: f64, y: f64| [(-0.5 * (x - 6.0) * (x - 6.0)).exp(), (-0.5 * (y - 6.0) * (y - 6.0)).exp()];
         let places: Vec<[f64; 2]> = (0..169).map(|k| [f64::from(k % 13), f64::from(k / 13)]).collect();
@@ -94,7 +96,7 @@ mod tests {
             let on_edge = |k: usize| (k % 13).abs_diff(6) < 2 || (k / 13).abs_diff(6) < 2;
             (0..169).map(|k| draw(rng) * if on_edge(k) { 3.0 } else { 0.5 }).collect()
         });
-        // Each pixel shares its light with the one to its right and the one below.
+        // Each pixel shares light with the one to its right and the one below.
         let shared = pull(|rng| {
             let white: Vec<f64> = (0..14 * 14).map(|_| draw(rng)).collect();
             (0..169).map(|k| k % 13 + k / 13 * 14).map(|k| white[k] + 0.5 * (white[k + 1] + white[k + 14])).collect()

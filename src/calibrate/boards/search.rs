@@ -1,5 +1,5 @@
-//! In: a picture and the description of a board. Out: the board's features with their ids, sub-pixel
-//! positions and sigmas, or a sentence that says why it was not found.
+//! In: a picture and the description of a board. Out: the board's features with their ids, sub-pixel positions and
+//! sigmas, or a sentence that states why it was not found.
 //! Frame and unit: pixels (centres at integers); feature ids index `BoardSpec::features()`.
 
 use super::chess::{charuco, chessboard};
@@ -9,7 +9,7 @@ use crate::fault::Result;
 use crate::raster::{Image, Light};
 use crate::recording::BoardSpec;
 
-/// Finds `board` in `image`. The fault says why where it is not found.
+/// Finds `board` in `image`. If it is not found, the fault states the reason.
 pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<BoardView> {
     options.check()?;
     let found = match board {

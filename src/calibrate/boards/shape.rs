@@ -1,16 +1,16 @@
-//! In: a board's features as drawn, coefficients. Out: where the features of the board that was printed and mounted
-//! are.
+//! In: a board's features as drawn, coefficients. Out: the positions of the features on the printed and mounted
+//! board.
 //! Frame and unit: board frame; mm. docs/math.md, Camera calibration (12).
 
 use crate::geometry::{Vec2, Vec3};
 
 /// Highest degree of the polynomials.
 const DEGREE: usize = 5;
-/// Terms that keep their degree: a stretch along x against y, and a shear.
+/// Number of linear terms: the stretch of x against y, and the shear.
 const LINEAR: usize = 2;
 
-/// The ways in which a board may differ from its drawing: smooth ones, that no place of the board and no scale of the
-/// drawing stand for.
+/// The modes in which a board may differ from its drawing. They are smooth, and none of them equals a motion of the
+/// board or a scale of the drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Basis {
     middle: Vec2,
@@ -19,7 +19,7 @@ pub struct Basis {
 }
 
 impl Basis {
-    /// For a board with these features. `None` where they lie on a line.
+    /// The basis for a board with these features. `None` if they lie on one line.
     pub fn of(features: &[Vec3]) -> Option<Basis> {
         let first = features.first()?.xy();
         let (low, high) = features.iter().fold((first, first), |(l, h), x| (l.inf(&x.xy()), h.sup(&x.xy())));
@@ -40,16 +40,17 @@ impl Basis {
         term < LINEAR
     }
 
-    /// Half of the board's longer side, mm: what bending and stretching are small against.
+    /// Half of the board's longer side, mm: the reference length for bending and stretching.
     pub fn size(&self) -> f64 {
         self.half.max()
     }
 
-    /// By how much a feature moves with each coefficient, mm a mm.
+    /// Displacement of a feature per unit of each coefficient, mm per mm.
     pub fn terms(&self, feature: &Vec3) -> Vec<Vec3> {
         let at = (feature.xy() - self.middle).component_div(&self.half);
         let (x, y) = (legendre(at.x), legendre(at.y));
-        // Both the same on a board of any sides: lengths over the longer half.
+        // Stretch and shear are scaled by the longer half side, so that they are isotropic on a board with unequal
+        // sides.
         let [u, v] = [at.x * self.half.x, at.y * self.half.y].map(|d| d / self.size());
         let mut out = vec![Vec3::new(u, -v, 0.0), Vec3::new(v, u, 0.0)];
         for degree in 2..=DEGREE {
@@ -61,7 +62,7 @@ impl Basis {
         out
     }
 
-    /// The feature with these coefficients, mm.
+    /// Position of the feature with these coefficients, mm.
     pub fn place(&self, feature: &Vec3, coefficients: &[f64]) -> Vec3 {
         self.terms(feature).iter().zip(coefficients).fold(*feature, |p, (t, c)| p + t * *c)
     }
@@ -78,21 +79,21 @@ fn legendre(x: f64) -> [f64; DEGREE + 1] {
     p
 }
 
-/// A board as its pictures show it.
+/// Shape of a board as estimated from its pictures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shape {
-    /// What the coefficients belong to.
+    /// The basis of the coefficients.
     pub basis: Basis,
-    /// [`Basis::LEN`] of them, mm.
+    /// [`Basis::LEN`] coefficients, mm.
     pub coefficients: Vec<f64>,
 }
 
 impl Shape {
-    /// Where a feature is, mm.
+    /// Position of a feature, mm.
     pub fn place(&self, feature: &Vec3) -> Vec3 {
         self.basis.place(feature, &self.coefficients)
     }
-    /// Root mean square of the features' departures from the drawing, mm: in the board's plane, and out of it.
+    /// rms of the features' displacements from the drawing, mm: in the board's plane, and out of it.
     pub fn departs(&self, features: &[Vec3]) -> [f64; 2] {
         let n = features.len().max(1) as f64;
         let off: Vec<Vec3> = features.iter().map(|x| self.place(x) - x).collect();
@@ -110,7 +111,7 @@ mod tests {
         (0..54).map(|i| Vec3::new(f64::from(i % 9) * 12.0 + 3.0, f64::from(i / 9) * 12.0, 0.0)).collect()
     }
 
-    /// With the seven motions of a similarity beside them the terms stay independent: nothing is estimated twice.
+    /// Together with the seven parameters of a similarity, the terms stay independent: nothing is estimated twice.
     #[test]
     fn no_term_is_a_motion_or_a_scale() {
         let (features, basis) = (features(), Basis::of(&features()).unwrap());

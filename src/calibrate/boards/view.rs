@@ -1,48 +1,48 @@
-//! In: nothing. Out: what a board looks like in a picture, and the settings of the search for it.
+//! In: nothing. Out: the features of a board in a picture, and the settings of the search for it.
 //! Frame and unit: pixels (centres at integers); feature ids index `BoardSpec::features()`.
 
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
 
-/// One feature of a board as seen.
+/// One feature of a board found in a picture.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct BoardPoint {
     /// Index into [`crate::recording::BoardSpec::features`].
     pub feature_id: usize,
-    /// Where it was seen, px.
+    /// Position in the picture, px.
     pub pixel: Vec2,
     /// Standard deviation per axis, px.
     pub sigma_px: f64,
 }
 
-/// A board as seen in one picture.
+/// The features of a board found in one picture.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct BoardView {
     /// The features that were found.
     pub points: Vec<BoardPoint>,
-    /// The board looks the same after a half (or quarter) turn: which of [`super::turns`] holds is unknown
-    /// here and must come from the whole set.
+    /// The board looks the same after a half (or quarter) turn. The picture does not show which of [`super::turns`]
+    /// applies; the entire set must resolve it.
     pub ambiguous: bool,
-    /// Diameter of a circle grid's dots as this picture shows it, mm, where the description leaves it open.
+    /// Diameter of a circle grid's dots measured in this picture, mm, if the description does not state it.
     pub dot_diameter: Option<f64>,
-    /// A ChArUco board's square at the origin is white: as described, or as its markers' ids say where the description
-    /// leaves it open.
+    /// Whether the square at the origin of a ChArUco board is white: as described, or by the markers' ids if the
+    /// description does not state it.
     pub begins_white: bool,
 }
 
 /// Settings of [`super::find`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct FindOptions {
-    /// Share of a square's side that a corner's fit reaches; 0.2..=0.48.
+    /// Length of a corner's fit as a share of a square's side; 0.2..=0.48.
     pub reach: f64,
-    /// The same in px at most; 4..=60.
+    /// Upper limit of this length, px; 4..=60.
     pub longest_px: f64,
-    /// Pixels farther than this from an edge are left out of a corner's fit; 2..=30 px.
+    /// Pixels farther than this from an edge are excluded from a corner's fit, px; 2..=30.
     pub band_px: f64,
-    /// Pictures with a longer side are first searched at a size near this; 320..=8192 px.
+    /// Pictures with a longer side are first searched after a reduction to about this size, px; 320..=8192.
     pub detector_px: usize,
-    /// Share of a chessboard's corners that may be missed by the detector and are then predicted and
-    /// verified on the picture; 0..=0.3.
+    /// Largest share of a chessboard's corners that the detector may miss; they are then predicted and verified in
+    /// the picture; 0..=0.3.
     pub gaps: f64,
 }
 
@@ -53,7 +53,7 @@ impl Default for FindOptions {
 }
 
 impl FindOptions {
-    /// Refuses values out of the ranges that the fields state.
+    /// Refuses values outside the ranges stated at the fields.
     pub fn check(&self) -> Result<()> {
         let ranges = [
             ("reach", self.reach, 0.2, 0.48),

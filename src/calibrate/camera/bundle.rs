@@ -1,4 +1,5 @@
-//! In: boards' features in pictures. Out: the least-squares problem of camera, the board's shape and boards' poses.
+//! In: boards' features in pictures. Out: the least-squares problem with the camera, the board's shape and the
+//! boards' poses.
 //! Frame and unit: camera_from_board, mm, rad; px (docs/math.md, Camera calibration).
 
 use super::lens::RATIONAL;
@@ -9,28 +10,29 @@ use crate::geometry::{Board, Camera, LeftStep, Rigid, Vec2, Vec3};
 use crate::solve::{Blocks, Problem, Residuals};
 use nalgebra::{Matrix2x3, Matrix2x6};
 
-/// What is estimated.
+/// The unknowns.
 #[derive(Clone, Debug)]
 pub(in crate::calibrate) struct State {
     pub camera: Parameters,
-    /// Coefficients of the board's shape, mm; empty for a board as drawn.
+    /// Coefficients of the board's shape, mm; empty for a board that is taken as drawn.
     pub shape: Vec<f64>,
     pub poses: Vec<Rigid<Camera, Board>>,
 }
 
-/// One corner: board frame as drawn, pixel, sigma.
+/// One corner: position in the board frame as drawn, pixel, sigma.
 pub(in crate::calibrate) type Corner = (Vec3, Vec2, f64);
 
-/// A board whose shape is estimated, and how far from its drawing it may be expected.
+/// A board whose shape is estimated, and the expected size of its deviation from the drawing.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::calibrate) struct Bent {
     pub basis: Basis,
-    /// Usual size of a coefficient in the board's plane and of one out of it, mm.
+    /// Usual size of a coefficient in the board's plane, and of one out of the plane, mm.
     pub usual: [f64; 2],
 }
 
 /// Usual size of a board's stretch and shear over half of its length. The two axes of a printer or plotter agree to a
-/// thousandth (their makers state 0.1 to 0.2 % of length for each), and a camera's focal lengths hide a larger one.
+/// thousandth (their makers state 0.1 to 0.2 % of length for each). A camera's focal lengths would hide a larger
+/// stretch.
 const STRETCH: f64 = 1e-3;
 
 impl Bent {
@@ -40,16 +42,16 @@ impl Bent {
     }
 }
 
-/// Usual size of the rational terms. Numerator and denominator bend nearly alike: without it a solve walks along what
-/// they cancel until a pole stands at the picture's rim.
+/// Usual size of the rational terms. Numerator and denominator bend nearly alike. Without this prior, a solve drifts
+/// along changes that cancel in both until a pole reaches the picture's rim.
 const RATIONAL_SIGMA: f64 = 2.0;
 
 pub(in crate::calibrate) struct Bundle<'a> {
     pub pictures: &'a [Vec<Corner>],
     pub like: &'a Intrinsics,
-    /// `None` for a board as drawn.
+    /// `None` for a board that is taken as drawn.
     pub bent: Option<Bent>,
-    /// Shared parameters that are estimated: intrinsic ones, then the shape's.
+    /// Estimated shared parameters: intrinsic ones, then the shape's.
     pub free: Vec<usize>,
 }
 
@@ -59,7 +61,7 @@ impl Bundle<'_> {
         PARAMETERS + self.bent.map_or(0, |_| Basis::LEN)
     }
 
-    /// Where a corner is on the board.
+    /// Position of a corner on the board, mm.
     pub fn place(&self, corner: &Corner, shape: &[f64]) -> Vec3 {
         self.bent.map_or(corner.0, |b| b.basis.place(&corner.0, shape))
     }
@@ -69,7 +71,7 @@ impl Bundle<'_> {
         self.bent.map(|b| Shape { basis: b.basis, coefficients: state.shape.clone() })
     }
 
-    /// Free parameters that are expected near zero, and how near.
+    /// Free parameters that are expected near zero, with their usual size.
     pub fn usual(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         let size = |i: usize| match (i.checked_sub(PARAMETERS), self.bent) {
             (Some(term), Some(bent)) => Some(bent.usual_of(term)),

@@ -1,5 +1,5 @@
-//! In: boards' features in pictures, the parameters that are held. Out: camera, board's shape and boards' poses that
-//! explain them best, and how far the camera is known.
+//! In: boards' features in pictures, the parameters that are held. Out: the camera, board's shape and boards' poses
+//! that fit them best, and the camera's covariance.
 //! Frame and unit: camera_from_board, mm, rad; px (docs/math.md, Camera calibration (7), (9)).
 
 use super::bundle::{Bent, Bundle, Corner, State};
@@ -8,13 +8,13 @@ use crate::calibrate::boards::shape::{Basis, Shape};
 use crate::camera::{Intrinsics, PARAMETERS, ParameterMatrix, Parameters};
 use crate::solve::{LmOptions, Loss, Outcome, Solution, lm};
 
-/// The corners with what stays the same from one choice of lens terms to the next.
+/// The corners, with the settings that do not change between choices of lens terms.
 #[derive(Clone, Copy)]
 pub(in crate::calibrate) struct Fit<'a> {
     pub corners: &'a [Vec<Corner>],
     pub like: &'a Intrinsics,
     pub loss: Loss,
-    /// `None` for a board as drawn.
+    /// `None` for a board that is taken as drawn.
     pub bent: Option<Bent>,
 }
 
@@ -32,18 +32,18 @@ impl Fit<'_> {
         let estimate_scale = self.loss != Loss::Squares;
         self.with(held, from, LmOptions { loss: self.loss, estimate_scale, ..LmOptions::default() })
     }
-    /// The same as near as choices need it.
+    /// The same, only as accurate as the choice of terms needs.
     pub fn rough(&self, held: &[usize], from: State) -> Option<Solution<State>> {
         let estimate_scale = self.loss != Loss::Squares;
         let options = LmOptions { loss: self.loss, estimate_scale, tolerance: 1e-5, ..LmOptions::default() };
         self.with(held, from, options).so_far()
     }
-    /// The same with all held but the poses.
+    /// The same with all parameters held except the poses.
     pub fn placed(&self, from: State) -> Option<Solution<State>> {
         let all: Vec<usize> = (0..self.bundle(&[]).shared()).collect();
         self.rough(&all, from)
     }
-    /// What every picture tells of the parameters that are not held.
+    /// The information of every picture about the free parameters.
     pub fn told(&self, held: &[usize], solution: &Solution<State>) -> Option<Vec<Told>> {
         each(&self.bundle(held), solution)
     }
@@ -53,11 +53,11 @@ impl Fit<'_> {
     pub fn shape(&self, solution: &Solution<State>) -> Option<Shape> {
         self.bundle(&[]).shape(&solution.state)
     }
-    /// Of the intrinsic parameters, as the pictures repeat.
+    /// Covariance of the intrinsic parameters, including the pictures' repeatability.
     pub fn covariance(&self, solution: &Solution<State>) -> Option<ParameterMatrix> {
         self.belief(solution).map(|b| b.0)
     }
-    /// The same, and the factors on the standard deviations that are in it ([`repeat`]).
+    /// The same, and the factors on the standard deviations that it contains ([`repeat`]).
     pub fn belief(&self, solution: &Solution<State>) -> Option<(ParameterMatrix, Parameters)> {
         let whole = solution.scaled_covariance()?;
         let mut covariance: ParameterMatrix = whole.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into();

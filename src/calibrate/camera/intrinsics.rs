@@ -1,5 +1,5 @@
-//! In: board features seen in several pictures. Out: the camera, every board's pose, covariance,
-//! residuals (\[zhang00\] section 3.2 and 3.3; docs/math.md, Camera calibration (7)).
+//! In: board features seen in several pictures. Out: the camera, every board's pose, covariance, residuals
+//! (\[zhang00\] section 3.2 and 3.3; docs/math.md, Camera calibration (7)).
 //! Frame and unit: pixels; board and camera frames in mm.
 
 use super::bundle::{Bent, Corner, State};
@@ -16,43 +16,43 @@ use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Mat3, Rigid, Vec2, Vec3};
 use crate::solve::{End, LmOptions, Loss, Solution};
 
-/// A picture of a board: its name for messages, the board's features, what was seen of them.
+/// A picture of a board: its name for messages, the board's features, their pixels.
 #[derive(Clone, Debug)]
 pub struct Observation {
-    /// Of the picture.
+    /// Name of the picture.
     pub name: String,
     /// Positions in the board frame, mm; `BoardPoint::feature_id` indexes them.
     pub features: std::sync::Arc<Vec<Vec3>>,
-    /// What was seen of the features, px.
+    /// The features found in the picture, px.
     pub view: BoardView,
 }
 
 /// Settings of the camera solve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolveOptions {
-    /// Which terms of the lens are estimated.
+    /// Selects the lens terms that are estimated.
     pub lens: Lens,
-    /// Estimate the skew; false for every sensor with square rows.
+    /// Whether the skew is estimated; false for every sensor with a rectangular pixel grid.
     pub skew: bool,
-    /// For single wrong corners; the threshold is in sigmas of the residuals.
+    /// Loss against single wrong corners; its threshold is in sigmas of the residuals.
     pub loss: Loss,
-    /// Weigh corners by their own sigmas; false: all alike.
+    /// Whether corners are weighted by their own sigmas; false: all have equal weight.
     pub weigh: bool,
-    /// What is believed of the boards.
+    /// Assumption about the shape of the boards.
     pub boards: Boards,
 }
 
-/// Whether boards are as drawn.
+/// Assumption about the shape of the boards.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
 #[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Boards {
-    /// As drawn, unless all pictures show one board and those that were held out fit better with a shape that is
-    /// estimated beside the camera ([`Shape`]). It is said.
+    /// As drawn, unless all pictures show one board and held-out pictures fit better with a shape that is estimated
+    /// besides the camera ([`Shape`]). The report states the choice.
     #[default]
     Evidence,
     /// As drawn.
     Drawn,
-    /// One board, its shape estimated whatever comes.
+    /// One board; its shape is always estimated.
     Shaped,
 }
 
@@ -75,49 +75,49 @@ impl Default for SolveOptions {
 /// A solved camera.
 #[derive(Clone, Debug)]
 pub struct Solved {
-    /// The camera that explains all pictures together.
+    /// The camera that fits all pictures best.
     pub intrinsics: Intrinsics,
-    /// The board's, where it was estimated ([`Boards`]).
+    /// The board's shape if it was estimated ([`Boards`]).
     pub shape: Option<Shape>,
-    /// One a picture.
+    /// One entry per picture.
     pub camera_from_board: Vec<Rigid<Camera, Board>>,
-    /// Of the intrinsic parameters (order: [`crate::camera::NAMES`]), zero rows for held ones; the residuals'
-    /// own scale is in it, and how the pictures repeat. `None` where something is not determined.
+    /// Covariance of the intrinsic parameters (order: [`crate::camera::NAMES`]) with zero rows for held ones. It
+    /// includes the scale of the residuals and the pictures' repeatability. `None` if something is not determined.
     pub covariance: Option<ParameterMatrix>,
-    /// By how much more the parameters scatter from picture to picture than corners that err by themselves would make
-    /// them: factors on the standard deviations, in the covariance already; 1 and more.
+    /// Scatter of the parameters from picture to picture, relative to the scatter by independent errors of the
+    /// corners. Factors on the standard deviations, 1 or more, already included in the covariance.
     pub repeat: Parameters,
-    /// Held at their value, indices into [`crate::camera::NAMES`].
+    /// Parameters held at their value, indices into [`crate::camera::NAMES`].
     pub held: Vec<usize>,
-    /// Residuals (seen minus predicted) in px and robust weight, picture by picture.
+    /// Residuals (seen minus predicted) in px and robust weights, picture by picture.
     pub residuals: Vec<Vec<(Vec2, f64)>>,
-    /// Over all corners, unweighted, px: sqrt(sum |r|² / n) as OpenCV reports it.
+    /// Unweighted rms over all corners, px: sqrt(sum |r|² / n) as OpenCV reports it.
     pub rms_px: f64,
-    /// Residuals over the corners' own sigmas; 1 where the corner fits' sigmas tell the truth.
+    /// Scale of the residuals over the corners' own sigmas; 1 if these sigmas are right.
     pub sigma0: f64,
     /// Reciprocal condition of the normal equations.
     pub condition: f64,
-    /// Steps that the last solve took.
+    /// Number of steps of the last solve.
     pub iterations: usize,
-    /// Whether it is a minimum.
+    /// Whether the fit is a minimum.
     pub end: End,
-    /// Families of lens terms that fit better and are not believed; the covariance contains what they would move.
+    /// Families of lens terms that fit better and are not adopted; the covariance contains the changes by them.
     pub doubts: Vec<Doubt>,
-    /// What is believed of the board's shape.
+    /// Prior of the board's shape.
     bent: Option<Bent>,
 }
 
 impl Solved {
-    /// Where features are on the board, mm.
+    /// Positions of features on the board, mm.
     pub fn places(&self, features: &[Vec3]) -> Vec<Vec3> {
         features.iter().map(|x| self.shape.as_ref().map_or(*x, |s| s.place(x))).collect()
     }
 }
 
-/// Solves for camera, boards' poses and, where the pictures tell it, the board's shape together.
+/// Solves jointly for the camera, the boards' poses and, if the pictures determine it, the board's shape.
 ///
 /// # Errors
-/// Fewer than two pictures with at least 6 corners each; corners on a line; no camera explains them.
+/// Fewer than two pictures with at least 6 corners each; corners on one line; no camera that fits them.
 pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveOptions) -> Result<Solved> {
     if pictures.len() < 2 {
         return Err(Fault::refused(format!("{} picture shows the board, 3 or more are needed", pictures.len()))
@@ -139,7 +139,7 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
     if !options.skew {
         held.push(SKEW);
     }
-    // First without the higher lens terms and with all corners counting: the closed form is far off.
+    // First without the higher lens terms and with all corners at full weight: the closed form is far off.
     let rough: Vec<usize> = (LENS + 1..PARAMETERS).chain(held.iter().copied()).collect();
     let coarse = LmOptions { max_iterations: 15, tolerance: 1e-4, ..LmOptions::default() };
     let first = fit.with(&rough, State { camera: start.parameters(), shape: Vec::new(), poses }, coarse);
@@ -161,7 +161,7 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
         resized(&mut fit, &mut solution, &held);
         by_evidence(&fit, &mut solution, &mut held);
     }
-    // From the optimum that was chosen it takes a step or two, and tells whether it is one.
+    // From the chosen optimum this takes a step or two, and shows whether it is a minimum.
     let (solution, end) = fit.fine(&held, solution.state).ended().ok_or_else(unsolved)?;
     if solution.state.camera.iter().any(|x| !x.is_finite()) {
         return Err(unsolved());
@@ -174,7 +174,7 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
     Ok(Solved { doubts, ..solved })
 }
 
-/// The same camera from some of its pictures, with what was chosen from all of them.
+/// The same camera from a subset of its pictures, with the choices made from all of them.
 pub(super) fn without(
     solved: &Solved,
     pictures: &[Observation],
@@ -202,14 +202,14 @@ fn unsolved() -> Fault {
         )
 }
 
-/// The ways in which the board may differ from its drawing, where all pictures show the same one.
+/// The basis for the board's shape, if all pictures show the same board.
 pub(super) fn one_board(pictures: &[Observation]) -> Option<Basis> {
     let first = pictures.first()?;
     pictures.iter().all(|o| o.features == first.features).then(|| Basis::of(&first.features)).flatten()
 }
 
-/// Corners with sigmas for the solver. A floor keeps a few very sharp corners from ruling: printing
-/// and flatness leave about 0.01 px on any real board.
+/// Corners with sigmas for the solver. A floor keeps a few very sharp corners from dominating: printing and flatness
+/// leave about 0.01 px on any real board.
 pub(super) fn measured(o: &Observation, weigh: bool) -> Vec<Corner> {
     let sigma = |s: f64| if weigh { s.hypot(0.01) } else { 1.0 };
     o.view.points.iter().map(|p| (o.features[p.feature_id], p.pixel, sigma(p.sigma_px))).collect()

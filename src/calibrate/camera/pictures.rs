@@ -1,5 +1,5 @@
-//! In: recordings of boards that one camera took. Out: the boards' corners, picture by picture, why the others have
-//! none, and the hashes of what went in.
+//! In: recordings of boards by one camera. Out: the boards' corners, picture by picture; why the other pictures have
+//! none; the hashes of the input files.
 //! Frame and unit: px.
 
 use super::intrinsics::Observation;
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A picture of one of the recordings: its name in messages, its place on the disk.
+/// A picture of one of the recordings: its name in messages, its file.
 struct Source<'a> {
     recording: &'a Recording,
     frame: &'a FrameRef,
@@ -25,8 +25,8 @@ impl Source<'_> {
     }
 }
 
-/// Looks for the board in one picture; `white` is the colour of its first square where its description leaves that
-/// open.
+/// Searches for the board in one picture. `white`: the colour of the first square, used if the board's description
+/// does not state it.
 fn look(source: &Source<'_>, white: Option<bool>, options: &FindOptions) -> Result<Observation> {
     let board = source.recording.meta.board_of(source.frame).ok_or_else(no_board)?;
     let known = white.map_or_else(|| board.clone(), |white| board.beginning(white));
@@ -34,7 +34,7 @@ fn look(source: &Source<'_>, white: Option<bool>, options: &FindOptions) -> Resu
     Ok(Observation { name: source.name.clone(), features: Arc::new(board.features()), view })
 }
 
-/// What stands before a recording's names: nothing where there is one recording, else its folder.
+/// Prefix of the names of each recording: empty for a single recording, otherwise its folder.
 fn labels(recordings: &[Recording]) -> Vec<String> {
     let short = |r: &Recording| r.folder.file_name().map(|n| n.to_string_lossy().into_owned());
     let label = |r: &Recording| {
@@ -57,7 +57,7 @@ fn sources(recordings: &[Recording]) -> Vec<Source<'_>> {
     out
 }
 
-/// All recordings must have been taken with one camera.
+/// The picture size of all recordings; refuses recordings of different sizes, since they must come from one camera.
 pub(in crate::calibrate) fn one_size(recordings: &[Recording]) -> Result<(u32, u32)> {
     let size = |r: &Recording| (r.meta.image.width, r.meta.image.height);
     let first = recordings.first().ok_or_else(|| Fault::usage("no recording was given").next("give one or more"))?;
@@ -77,17 +77,17 @@ pub(in crate::calibrate) fn one_size(recordings: &[Recording]) -> Result<(u32, u
     }
 }
 
-/// What was found in all pictures.
+/// The result of the search in all pictures.
 pub(in crate::calibrate) struct Pictures {
     pub found: Vec<Observation>,
-    /// Name and reason.
+    /// Name of each excluded picture, and the reason.
     pub left_out: Vec<(String, String)>,
-    /// Name to SHA-256 of the pictures found, and of what describes them.
+    /// SHA-256 by name, of the used pictures and of the files that describe them.
     pub inputs: BTreeMap<String, String>,
 }
 
-/// Looks for the board in every picture (ambient ones where there are such). A picture that comes twice counts once.
-/// `progress` is called with (done, all).
+/// Searches for the board in every picture (in the ambient one where there is one). A picture that occurs twice
+/// counts once. `progress` is called with (done, all).
 pub(in crate::calibrate) fn pictures(
     recordings: &[Recording],
     options: &FindOptions,
@@ -101,7 +101,7 @@ pub(in crate::calibrate) fn pictures(
         progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, all);
         seen
     });
-    // A picture that does not tell the colour of its board's first square takes it from those that do.
+    // A picture that does not show the colour of its board's first square takes it from one that does.
     if let Some(white) = seen.iter().find_map(|o| o.as_ref().ok()).map(|o| o.view.begins_white) {
         sources.par_iter().zip(&mut seen).filter(|(_, o)| o.is_err()).for_each(|(source, o)| {
             if source.first_square_may_be_open() {
@@ -110,7 +110,7 @@ pub(in crate::calibrate) fn pictures(
         });
     }
     let (mut pictures, mut left_out): (Vec<Observation>, Vec<(String, Fault)>) = Default::default();
-    // SHA-256 to name: a picture that comes again says nothing new.
+    // SHA-256 to name: a repeated picture carries no new information.
     let mut known: BTreeMap<String, String> = BTreeMap::new();
     for (Source { recording, file, name, .. }, seen) in sources.iter().zip(seen) {
         let (name, hash) = (name.clone(), crate::rig::hash_file(&recording.folder.join(file)).ok());
@@ -125,7 +125,8 @@ pub(in crate::calibrate) fn pictures(
         known.extend(hash.map(|h| (h, name.clone())));
         match seen {
             Ok(o) => pictures.push(o),
-            // Wrong sizes, missing files and misdescribed boards are the recording's fault, not one picture's.
+            // Wrong sizes, missing files and wrong board descriptions are faults of the recording, not of one
+            // picture.
             Err(fault) if fault.kind != Kind::Refused => return Err(fault),
             Err(fault) => left_out.push((name, fault)),
         }
@@ -151,7 +152,7 @@ fn no_board() -> Fault {
 
 /// The fault of recordings that show their board in too few pictures.
 fn too_few(found: usize, all: usize, left_out: &[(String, Fault)]) -> Fault {
-    // The reason that most pictures give; of equal ones the first.
+    // The most frequent reason among the pictures; the first one of equally frequent reasons.
     let votes = |l: &(String, Fault)| left_out.iter().filter(|o| o.1.cause == l.1.cause).count();
     let first = left_out.iter().rev().max_by_key(|l| votes(l)).map(|l| l.1.clone());
     let listed: String = left_out.iter().map(|(n, f)| format!("\n    {n}: {}", f.what)).collect();

@@ -1,6 +1,6 @@
-//! In: recordings of boards. Out: the camera's calibration with verdict, advice and all that a
-//! report shows (\[zhang00\]; docs/math.md, Camera calibration).
-//! Frame and unit: camera frame; pixels, mm, degrees where the name says so.
+//! In: recordings of boards. Out: the camera's calibration with verdict, advice and the data of the report
+//! (\[zhang00\]; docs/math.md, Camera calibration).
+//! Frame and unit: camera frame; pixels, mm; degrees where the name states them.
 
 use super::choice::Doubt;
 use super::intrinsics::{Boards, Observation, SolveOptions, Solved, solve};
@@ -21,9 +21,9 @@ use std::collections::BTreeMap;
 /// Settings of [`calibrate`].
 #[derive(Clone, Debug, Default)]
 pub struct CameraOptions {
-    /// Of the search for the board.
+    /// Settings of the search for the board.
     pub find: FindOptions,
-    /// Of the solve.
+    /// Settings of the solve.
     pub solve: SolveOptions,
     /// Depths and tolerance by which the result is judged; without them the boards' median distance and a share of the
     /// view.
@@ -31,7 +31,7 @@ pub struct CameraOptions {
 }
 
 impl CameraOptions {
-    /// Refuses values out of the ranges that the fields state.
+    /// Refuses values outside the ranges stated at the fields.
     pub fn check(&self) -> Result<()> {
         self.find.check()?;
         self.asked.check()?;
@@ -43,12 +43,12 @@ impl CameraOptions {
     }
 }
 
-/// A camera calibration with everything a report shows.
+/// A camera calibration with the data of its report.
 #[derive(Clone, Debug)]
 pub struct CameraResult {
-    /// As it is stored.
+    /// The calibration in its stored form.
     pub calibration: Calibration<Intrinsics>,
-    /// Pictures that went in, in order; `solved` is indexed alike.
+    /// The used pictures in order; `solved` has the same indices.
     pub used: Vec<Observation>,
     /// The camera with every board's pose and every corner's residual.
     pub solved: Solved,
@@ -56,17 +56,17 @@ pub struct CameraResult {
     pub left_out: Vec<(String, String)>,
     /// Leave-one-out rms of each used picture, px.
     pub hold_out_px: Vec<Option<f64>>,
-    /// Corners that the robust loss set aside or that stand out: picture, feature id, residual px.
+    /// Corners that the robust loss gave little weight or that stand out: picture, feature id, residual px.
     pub worst: Vec<(String, usize, f64)>,
 }
 
-/// Finds the board in every picture (ambient ones where there are such) of recordings that one camera took, and
-/// calibrates it from all of them together. A picture that comes twice counts once. `progress` is called with
-/// (done, all).
+/// Finds the board in every picture of recordings by one camera (in the ambient picture where there is one), and
+/// calibrates the camera from all of them together. A picture that occurs twice counts once. `progress` is called
+/// with (done, all).
 ///
 /// # Errors
-/// No board described; no pictures; pictures of two sizes; the board found in fewer than two of them (with the
-/// reasons).
+/// No board described; no pictures; pictures of two sizes; the board found in fewer than two of them (the fault gives
+/// the reasons).
 pub fn calibrate(
     recordings: &[Recording],
     options: &CameraOptions,
@@ -84,21 +84,20 @@ pub fn calibrate(
     Ok(result)
 }
 
-/// A picture whose typical residual, over its corners' sigmas, is this many times the median picture's is
-/// set aside.
+/// A picture is excluded if its typical residual, over its corners' sigmas, is this many times the median picture's.
 const OUTLIER_PICTURE: f64 = 3.5;
 
-/// The pictures that agree, and the camera that they make.
+/// The pictures that agree, and the camera solved from them.
 struct Agreed {
     pictures: Vec<Observation>,
     solved: Solved,
     /// Excluded pictures: name and reason.
     left_out: Vec<(String, String)>,
-    /// More than a quarter of the pictures would have to go.
+    /// True if more than a quarter of the pictures would have to be excluded.
     contradiction: bool,
 }
 
-/// Calibrates from boards that were found already.
+/// Calibrates from boards that were already found.
 pub fn from_observations(
     pictures: Vec<Observation>,
     left_out: Vec<(String, String)>,
@@ -120,8 +119,8 @@ pub fn from_observations(
     Ok(CameraResult { calibration, used: pictures, solved, left_out, hold_out_px, worst })
 }
 
-/// Solves, and sets aside what does not fit: a few pictures of another readout, and one picture at a time, the worst
-/// first, because a wrong one bends the others' residuals too.
+/// Solves, and excludes what does not fit: first a few pictures with another readout, then one picture per round, the
+/// worst first. A wrong picture also increases the residuals of the others.
 fn agree(
     mut pictures: Vec<Observation>,
     mut left_out: Vec<(String, String)>,
@@ -153,7 +152,7 @@ fn agree(
     Ok(Agreed { pictures, solved, left_out, contradiction })
 }
 
-/// Of the parameters that a calibration names: all but those of the lens that were held.
+/// Covariance of the parameters that a calibration names: all except held lens terms.
 fn stated_covariance(solved: &Solved) -> Covariance {
     let stated = |i: &usize| *i < ALWAYS_NAMED || !solved.held.contains(i);
     let stated: Vec<usize> = (0..NAMES.len()).filter(stated).collect();
@@ -163,13 +162,13 @@ fn stated_covariance(solved: &Solved) -> Covariance {
     })
 }
 
-/// Typical residual of a picture over its corners' sigmas; single wrong corners do not count.
+/// Typical residual of a picture over its corners' sigmas; robust against single wrong corners.
 fn typical_misfit(o: &Observation, residuals: &[(Vec2, f64)]) -> f64 {
     let lengths = o.view.points.iter().zip(residuals).map(|(p, (r, _))| r.norm() / p.sigma_px.hypot(0.01));
     crate::solve::robust_scale(&mut lengths.collect::<Vec<f64>>(), 2)
 }
 
-/// Index of the picture that fits worst and how many times worse than the median picture.
+/// Index of the picture with the worst fit, and its misfit relative to the median picture's.
 fn worst_picture(pictures: &[Observation], solved: &Solved) -> Option<(usize, f64)> {
     if pictures.len() < 4 {
         return None;
@@ -182,7 +181,7 @@ fn worst_picture(pictures: &[Observation], solved: &Solved) -> Option<(usize, f6
     Some((i, worst / median))
 }
 
-/// Corners more than four robust sigmas off, the worst first, at most 20.
+/// Corners with residuals beyond four robust sigmas, the worst first, at most 20.
 fn worst_corners(pictures: &[Observation], solved: &Solved) -> Vec<(String, usize, f64)> {
     let mut lengths: Vec<f64> = solved.residuals.iter().flatten().map(|r| r.0.norm()).collect();
     let limit = 4.0 * crate::solve::robust_scale(&mut lengths, 2);
@@ -218,7 +217,7 @@ struct Evidence<'a> {
     /// Share of the image in which corners were seen.
     covered: f64,
     corners: usize,
-    /// rms of the pictures that were held out, px; `None` where none could be.
+    /// rms of the held-out pictures, px; `None` if none could be held out.
     held_out: Option<f64>,
 }
 
@@ -293,7 +292,7 @@ fn judge(
 }
 
 impl Evidence<'_> {
-    /// Whether the pictures are enough, and their boards tilted enough, for what is wanted of the viewing rays.
+    /// Checks that the pictures and the tilts of their boards suffice for the required accuracy of the viewing rays.
     fn determined(&self, j: &mut Judgement) {
         let (pictures, tilt) = (self.agreed.pictures.len(), self.tilt);
         j.at_best(Verdict::BadlyDetermined, pictures < 3, || {
@@ -329,7 +328,7 @@ impl Evidence<'_> {
         self.limits.middle() / (0.5 * (k.fx + k.fy))
     }
 
-    /// Whether the model fits the pictures, those held out too, and all of the image.
+    /// Checks that the model fits the pictures, including held-out ones, everywhere in the image.
     fn fits(&self, j: &mut Judgement) {
         let Agreed { solved, contradiction, .. } = self.agreed;
         j.ended(solved.end);
@@ -385,19 +384,19 @@ impl Evidence<'_> {
             figures.insert("holdout_rms_px".into(), held);
             figures.insert("holdout_rms_mm".into(), held * self.distance / (0.5 * (k.fx + k.fy)));
         }
-        // JSON has no infinity: an unknown figure is left out, the reason says why.
+        // JSON has no infinity: unknown figures are omitted; a reason mentions them.
         figures.retain(|_, v| v.is_finite());
         figures
     }
 }
 
-/// By how much the board departs from its drawing, mm rms, in its plane and out of it; `None` where it was taken as
+/// Deviation of the board from its drawing, rms, mm, in its plane and out of it; `None` if the board was taken as
 /// drawn.
 fn board_shape(pictures: &[Observation], solved: &Solved) -> Option<[f64; 2]> {
     Some(solved.shape.as_ref()?.departs(&pictures.first()?.features))
 }
 
-/// The lens parameters that the evidence holds at 0, in words; `None` where the lens was stated.
+/// The lens parameters that the evidence holds at 0, in words; `None` if the lens was stated.
 fn held_parameters(solved: &Solved, lens: Lens) -> Option<String> {
     let names = held_names(&solved.held);
     (lens == Lens::Evidence && !names.is_empty()).then(|| {
@@ -409,7 +408,7 @@ fn held_parameters(solved: &Solved, lens: Lens) -> Option<String> {
     })
 }
 
-/// The terms that the evidence took in, in words.
+/// The lens terms that the evidence added, in words.
 fn further_parameters(solved: &Solved, lens: Lens) -> Option<String> {
     let names = further_names(&solved.held);
     (lens == Lens::Evidence && !names.is_empty())

@@ -1,6 +1,6 @@
-//! In: a solved camera and what it was solved from. Out: how far it can be trusted: expected errors,
-//! spread of tilts, coverage, hold-out error, the next best picture.
-//! Frame and unit: pixels, mm, degrees where the name says so.
+//! In: a solved camera and its pictures. Out: measures of its accuracy: expected errors, spread of tilts, coverage,
+//! hold-out error, the next best picture.
+//! Frame and unit: pixels, mm; degrees where the name states them.
 
 use super::intrinsics::{Observation, SolveOptions, Solved, without};
 use super::ray_error::{expected_ray_error, expected_ray_error_at, raster};
@@ -53,9 +53,9 @@ impl Covered {
     }
 }
 
-/// Leave-one-out: the camera from all other pictures, with the lens's terms and the board's shape that were chosen from
-/// all; the picture left out fitted with its pose alone. Rms per picture in px; `None` where the others do not give a
-/// camera. More than 24 pictures are left out in 24 groups.
+/// Leave-one-out rms per picture, px. The camera comes from all other pictures, with the lens terms and the board's
+/// shape chosen from all; only the pose of the excluded picture is fitted. `None` if the others determine no camera.
+/// More than 24 pictures are excluded in 24 groups.
 pub fn hold_out(pictures: &[Observation], solved: &Solved, options: &SolveOptions) -> Vec<Option<f64>> {
     use rayon::prelude::*;
     let groups = pictures.len().min(24);
@@ -74,23 +74,23 @@ pub fn hold_out(pictures: &[Observation], solved: &Solved, options: &SolveOption
     rms
 }
 
-/// sqrt(sum |r|² / n) of one picture with its own pose, px.
+/// sqrt(sum |r|² / n) of one picture with a fitted pose, px.
 fn alone(camera: &Intrinsics, shape: Option<&Shape>, o: &Observation) -> Option<f64> {
     let places: Vec<Vec3> = o.features.iter().map(|x| shape.map_or(*x, |s| s.place(x))).collect();
     let pose = crate::calibrate::pose::pose_of_points(camera, &places, &o.view).ok()?;
     Some(pose.rms_px * std::f64::consts::SQRT_2)
 }
 
-/// A picture worth taking, in words, and the expected ray error with it, px.
+/// A suggested picture, in words, and the expected ray error with it, px.
 pub struct NextPicture {
-    /// Where to hold the board, and how tilted.
+    /// Position and tilt of the board, in words.
     pub words: String,
-    /// Expected error of a viewing ray once it is taken, px.
+    /// Expected error of a viewing ray with this picture added, px.
     pub expected_px: f64,
 }
 
-/// Tries boards at nine places of the image, four tilts and two distances, and returns the one that
-/// would improve the expected ray error most. `sigma_px` is the corners' noise as found.
+/// Tries boards at nine positions in the image, four tilts and two distances. Returns the one that improves the
+/// expected ray error most. `sigma_px`: estimated noise of the corners.
 pub fn next_picture(solved: &Solved, features: &[Vec3], typical_distance: f64, sigma_px: f64) -> Option<NextPicture> {
     let covariance = solved.covariance.as_ref()?;
     let k = &solved.intrinsics;
@@ -149,8 +149,8 @@ const TILTS: [(Vec3, f64, &str); 4] = [
     (Vec3::new(0.0, 1.0, 0.0), -1.0, "about the vertical axis, its right edge away,"),
 ];
 
-/// Information on the intrinsics from one more picture whose pose is unknown (Schur complement). Only
-/// corners inside the image count; `None` where fewer than 8 are.
+/// Information on the intrinsics from one more picture with an unknown pose (Schur complement). Only corners inside
+/// the image count; `None` if there are fewer than 8.
 fn picture_information(
     k: &Intrinsics,
     features: &[Vec3],
@@ -180,7 +180,7 @@ fn picture_information(
     (inside >= 8).then(|| pp.try_inverse().map(|inv| kk - kp * inv * kp.transpose())).flatten()
 }
 
-/// True where the lens model folds back inside the image: it cannot be inverted there.
+/// True if the lens model folds back inside the image, where it cannot be inverted.
 pub fn folds(k: &Intrinsics) -> bool {
     let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (0.5, 0.0), (0.5, 1.0), (0.0, 0.5), (1.0, 0.5)];
     corners.iter().any(|(x, y)| {
@@ -189,13 +189,13 @@ pub fn folds(k: &Intrinsics) -> bool {
     })
 }
 
-/// Mean displacement of each feature on the board over all pictures and its standard error, mm: where
-/// the board is not as described (warped, badly printed), a feature is off the same way in every
-/// picture. Entries: feature id, mean, error, pictures; features in fewer than 3 pictures are left out.
+/// Mean displacement of each feature on the board over all pictures and its standard error, mm. If the board differs
+/// from its description (warped, badly printed), a feature is displaced the same way in every picture. Entries:
+/// feature id, mean, error, pictures; features in fewer than 3 pictures are excluded.
 pub fn feature_bias(pictures: &[Observation], solved: &Solved) -> Vec<(usize, Vec2, f64, usize)> {
     let count = pictures.iter().flat_map(|o| o.view.points.iter().map(|p| p.feature_id + 1)).max().unwrap_or(0);
     let mut sums = vec![(Vec2::zeros(), 0.0, 0usize); count];
-    // The ids of another board mean other places: the board of the first picture is the one that is judged.
+    // The ids of another board mean other positions; only the board of the first picture is judged.
     let same = |o: &Observation| pictures.first().is_some_and(|first| o.features == first.features);
     let each = pictures.iter().zip(&solved.residuals).zip(&solved.camera_from_board);
     for ((o, residuals), pose) in each.filter(|((o, _), _)| same(o)) {
@@ -229,7 +229,7 @@ fn middle(features: &[Vec3], view: &BoardView, pose: &Rigid<Camera, Board>) -> V
     pose.point(&(sum / view.points.len().max(1) as f64))
 }
 
-/// Tilt of a board against the image plane, degrees.
+/// Tilt of a board relative to the image plane, degrees.
 pub fn tilt_deg(pose: &Rigid<Camera, Board>) -> f64 {
     let n: Vec3 = pose.rotation.column(2).into();
     n.xy().norm().atan2(n.z.abs()).to_degrees()

@@ -1,4 +1,4 @@
-//! In: a camera and its covariance. Out: how far a viewing ray is expected to be off.
+//! In: a camera and its covariance. Out: the expected error of a viewing ray.
 //! Frame and unit: px.
 
 use crate::calibrate::projection::project;
@@ -32,14 +32,14 @@ fn ray_jacobian(k: &Intrinsics, at: impl Iterator<Item = Vec2>) -> DMatrix<f64> 
     turn.map_or(a.clone(), |t| a - b * t)
 }
 
-/// Rms distance of one camera's viewing rays from another's over the image, px, after the best rotation.
+/// rms distance between the viewing rays of two cameras over the image, px, after the best rotation.
 pub(super) fn rays_apart(a: &Intrinsics, b: &Intrinsics) -> f64 {
     let moved = ray_jacobian(a, raster(a, 9, 7)) * (b.parameters() - a.parameters());
     (moved.norm_squared() / (moved.len() as f64 / 2.0)).sqrt()
 }
 
-/// Change of the parameters that a covariance tells of, so that the viewing rays move as by `moved` of all parameters:
-/// to `sigma_px` or as near as the covariance makes likely. `None` where no ray can be followed.
+/// Change of the uncertain parameters that moves the viewing rays as the change `moved` of all parameters does. It is
+/// the most likely one under `covariance`, with the rays known to `sigma_px`. `None` if the system cannot be solved.
 pub(super) fn following(
     k: &Intrinsics,
     covariance: &ParameterMatrix,

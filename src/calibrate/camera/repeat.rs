@@ -1,5 +1,5 @@
-//! In: a camera solved from several pictures. Out: how much worse its numbers repeat from picture to picture than the
-//! corners' noise says: one factor on each standard deviation.
+//! In: a camera solved from several pictures. Out: the scatter of its parameters from picture to picture relative to
+//! the scatter by the corners' noise: one factor on each standard deviation.
 //! Frame and unit: the camera's parameters (order: [`crate::camera::NAMES`]). docs/math.md, Camera calibration (9).
 
 use super::bundle::{Bundle, State};
@@ -7,18 +7,20 @@ use crate::camera::{PARAMETERS, Parameters};
 use crate::solve::Solution;
 use nalgebra::{DMatrix, DVector, Matrix6, OMatrix, U6, Vector6};
 
-/// As many pictures count for the belief that all parameters repeat alike: few pictures tell little of each one.
+/// Weight, in pictures, of the prior that all parameters repeat equally well: few pictures determine little about
+/// each one.
 const ALIKE: f64 = 2.0;
-/// Most that one picture may weigh in a direction: of what it alone determines no other one can tell anything.
+/// Largest leverage of one picture in a direction: a parameter that one picture alone determines cannot be checked by
+/// others.
 const LEVERAGE: f64 = 0.99;
 
-/// Information on the free parameters from one picture whose pose is unknown, and its pull on them.
+/// Information about the free parameters from one picture with an unknown pose, and its gradient.
 pub(super) type Told = (DMatrix<f64>, DVector<f64>);
 
-/// Corners of one picture are not independent: blur, light and the board's bending move them together. So pictures
-/// are taken as the things that repeat: each one's pull on the solution, corrected for its own weight in it
-/// \[bell02\], against what corners that err by themselves would pull. Never below 1. `None` for fewer than 3
-/// pictures, or where something is not determined.
+/// Corners of one picture are not independent: blur, light and the board's bending move them together. The pictures
+/// are therefore the units that repeat. The pull of each on the solution, corrected for its own leverage \[bell02\],
+/// is compared with the pull that independent corner errors would cause. Never below 1. `None` for fewer than 3
+/// pictures, or if something is not determined.
 pub(super) fn repeat(bundle: &Bundle<'_>, solution: &Solution<State>) -> Option<Parameters> {
     let told = each(bundle, solution)?;
     let (n, p) = (told.len() as f64, bundle.free.len());
@@ -34,14 +36,15 @@ pub(super) fn repeat(bundle: &Bundle<'_>, solution: &Solution<State>) -> Option<
     }
     let root = all.cholesky()?.inverse().cholesky()?.l();
     let pulls: Vec<DVector<f64>> = told.iter().map(|t| pulled(t, &root) / variance.sqrt()).collect();
-    // What the pictures determine of each direction: all, but of those that are expected near zero.
+    // Share of each direction that the pictures determine: below 1 for parameters with a prior near zero.
     let share = root.transpose() * information * &root;
     let alike = pulls.iter().map(|u| u.norm_squared()).sum::<f64>() / share.trace();
     let covariance = &root * share * root.transpose();
     if !alike.is_finite() {
         return None;
     }
-    // A variance from few pictures is uncertain itself, and errors over it have the long tails of Student's.
+    // A variance from few pictures is uncertain itself; errors divided by it have the long tails of Student's
+    // distribution.
     let freedom = n - 1.0 + ALIKE;
     let tails = freedom / (freedom - 2.0);
     let mut out = Parameters::repeat(1.0);
@@ -53,15 +56,15 @@ pub(super) fn repeat(bundle: &Bundle<'_>, solution: &Solution<State>) -> Option<
     Some(out)
 }
 
-/// A picture's pull where all together have unit information (`root` of the covariance): (1 - W)^-1/2 u, W its share
-/// of that.
+/// Pull of a picture in coordinates where all pictures together have unit information (`root` of the covariance): (1
+/// - W)^-1/2 u, with W the picture's share of that information.
 fn pulled((own, pull): &Told, root: &DMatrix<f64>) -> DVector<f64> {
     let share = (root.transpose() * own * root).symmetric_eigen();
     let free = share.eigenvalues.map(|w| 1.0 / (1.0 - w.clamp(0.0, LEVERAGE)).sqrt());
     &share.eigenvectors * free.component_mul(&(share.eigenvectors.transpose() * (root.transpose() * pull)))
 }
 
-/// What every picture tells at a solution.
+/// The information of every picture at a solution.
 pub(super) fn each(bundle: &Bundle<'_>, solution: &Solution<State>) -> Option<Vec<Told>> {
     let State { camera, shape, poses } = &solution.state;
     let camera = bundle.like.with_parameters(camera);
@@ -89,7 +92,7 @@ pub(super) fn each(bundle: &Bundle<'_>, solution: &Solution<State>) -> Option<Ve
     bundle.pictures.iter().zip(poses).map(picture).collect()
 }
 
-/// Standard deviations of a covariance times these.
+/// Multiplies the standard deviations of a covariance by these factors.
 pub(super) fn widened(covariance: &mut crate::camera::ParameterMatrix, by: &Parameters) {
     for i in 0..PARAMETERS {
         for j in 0..PARAMETERS {

@@ -1,4 +1,4 @@
-//! In: a camera calibration. Out: the page that a person judges it by.
+//! In: a camera calibration. Out: its report page.
 //! Frame and unit: pixels and mm as labelled.
 
 use super::intrinsics::Observation;
@@ -57,7 +57,7 @@ fn parameters(result: &CameraResult) -> Vec<Vec<String>> {
     covariance.parameters.iter().map(row).collect()
 }
 
-/// Figures of what corners and boards say: where they were seen, and what is left over where.
+/// Figures of corners and boards: their positions and their residuals.
 fn draw_residuals(page: &mut Page, result: &CameraResult) {
     let (k, solved) = (&result.calibration.value, &result.solved);
     let seen: Vec<_> = result.used.iter().flat_map(|o| o.view.points.iter().map(|p| p.pixel)).collect();
@@ -98,7 +98,7 @@ fn draw_residuals(page: &mut Page, result: &CameraResult) {
     page.figure("Residual against distance from the principal point", &scatter(&by_radius, "px from the centre", "px"));
 }
 
-/// The board as its pictures show it.
+/// Figures of the board's estimated shape.
 fn draw_shape(page: &mut Page, result: &CameraResult, shape: &Shape) {
     let Some(features) = result.used.first().map(|o| &o.features) else { return };
     let off: Vec<Vec3> = features.iter().map(|x| shape.place(x) - x).collect();
@@ -122,7 +122,7 @@ fn draw_shape(page: &mut Page, result: &CameraResult, shape: &Shape) {
     );
 }
 
-/// The ten features whose mean residual on the board is largest beside its standard error.
+/// The ten features with the largest mean residual on the board relative to its standard error.
 fn uneven_features(result: &CameraResult) -> Vec<Vec<String>> {
     let mut bias = feature_bias(&result.used, &result.solved);
     bias.sort_by(|a, b| (b.1.norm() / b.2).total_cmp(&(a.1.norm() / a.2)));
@@ -140,7 +140,7 @@ fn uneven_features(result: &CameraResult) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// Where each picture's board was.
+/// Position of the board in each picture.
 fn boards(result: &CameraResult) -> Vec<Vec<String>> {
     let row = |(o, p): (&Observation, &Rigid<Camera, Board>)| {
         let t = p.translation;
@@ -151,7 +151,7 @@ fn boards(result: &CameraResult) -> Vec<Vec<String>> {
     result.used.iter().zip(&result.solved.camera_from_board).map(row).collect()
 }
 
-/// A file name without its extension and zeros.
+/// A file name without its extension and without the text before the first digit.
 fn short(name: &str) -> String {
     name.rsplit_once('.').map_or(name, |(stem, _)| stem).trim_start_matches(|c: char| !c.is_ascii_digit()).into()
 }

@@ -1,5 +1,5 @@
-//! In: homographies from a plane to pictures of it. Out: a first pinhole camera
-//! (\[zhang00\] section 3.1, docs/math.md, Camera calibration (5) and (6)).
+//! In: homographies from a plane to pictures of it. Out: a start value for a pinhole camera (\[zhang00\] section 3.1,
+//! docs/math.md, Camera calibration (5) and (6)).
 //! Frame and unit: pixels; the plane's unit.
 
 use crate::calibrate::pose::pose_from_homography;
@@ -7,18 +7,18 @@ use crate::camera::{Distortion, Intrinsics};
 use crate::geometry::{Mat3, Vec2};
 use nalgebra::{DMatrix, Matrix5, Vector5};
 
-/// One plane as seen: where its points are, where they were seen, and the homography between.
+/// One view of a plane: positions of its points, their pixels, and the homography between them.
 pub struct Seen {
-    /// Places in the plane, in its unit.
+    /// Positions in the plane, in its unit.
     pub plane: Vec<Vec2>,
-    /// Where they were seen, px; same order.
+    /// Their pixels in the same order, px.
     pub pixels: Vec<Vec2>,
-    /// Maps places in the plane to pixels, both homogeneous.
+    /// Maps positions in the plane to pixels, both homogeneous.
     pub homography: Mat3,
 }
 
-/// The camera without lens that explains the views best: Zhang's closed form with zero skew, and, in
-/// case wrong pictures have spoilt it, a ladder of focal lengths with the centre as principal point.
+/// The camera without distortion that fits the views best. Candidates are Zhang's closed form with zero skew and, in
+/// case wrong pictures spoil it, a range of focal lengths with the principal point at the centre.
 pub fn first_camera(seen: &[Seen], width: u32, height: u32) -> Option<Intrinsics> {
     let (w, h) = (f64::from(width), f64::from(height));
     let pinhole = |fx: f64, fy: f64, cx: f64, cy: f64| Intrinsics {
@@ -47,7 +47,7 @@ fn closed_form(seen: &[Seen], w: f64, h: f64) -> Option<[f64; 4]> {
     let mut m = Matrix5::zeros();
     for view in seen {
         let g = unit * view.homography;
-        // Scale each view so that all weigh alike.
+        // Scale each view so that all have equal weight.
         let g = g / (g.column(0).norm() * g.column(1).norm()).sqrt();
         let v = |a: usize, b: usize| {
             let (p, q) = (g.column(a), g.column(b));
@@ -68,8 +68,7 @@ fn closed_form(seen: &[Seen], w: f64, h: f64) -> Option<[f64; 4]> {
     sane.then_some(k)
 }
 
-/// Median over the views of the squared reprojection error with each view's own pose: half of the
-/// views may be wrong.
+/// Median over the views of the squared reprojection error with each view's own pose. Half of the views may be wrong.
 fn misfit(seen: &[Seen], k: &Intrinsics) -> f64 {
     let to_normalised = Mat3::new(1.0 / k.fx, 0.0, -k.cx / k.fx, 0.0, 1.0 / k.fy, -k.cy / k.fy, 0.0, 0.0, 1.0);
     let mut all: Vec<f64> = seen

@@ -1,37 +1,37 @@
-//! In: the covariance of a calibrated camera, and what the hand-eye pictures' own pixels say about it. Out: the
-//! camera as both know it, before the robot's poses speak.
+//! In: the covariance of a calibrated camera, and the information about it in the hand-eye pictures' own pixels. Out:
+//! the camera by both, before the robot's poses are used.
 //! Frame and unit: px and the lens's own (docs/math.md, Hand-eye (9)).
 
 use super::closed::Pair;
 use crate::calibrate::camera::ray_error::expected_ray_error;
 use crate::camera::{CameraCovariance, Intrinsics, ParameterMatrix, Parameters};
 
-/// Change of the camera's parameters from those that the boards were measured with: mean + root z, z ~ N(0, I).
-/// The root has no inverse where a parameter counts as known.
+/// Change of the camera's parameters from those that the boards were measured with: mean + root z, z ~ N(0, I). The
+/// root has no inverse if a parameter counts as known.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraBelief {
     /// Expected change, in the order and units of [`crate::camera::NAMES`].
     pub mean: Parameters,
-    /// A root of the change's covariance: z has the columns, the parameters have the rows.
+    /// A root of the change's covariance: columns belong to z, rows to the parameters.
     pub root: ParameterMatrix,
 }
 
-/// A belief after pictures were seen.
+/// A belief updated by pictures.
 pub struct Sharpened {
-    /// What is believed now.
+    /// The updated belief.
     pub belief: CameraBelief,
-    /// New z by the old one: how the belief follows the camera that was given.
+    /// Derivatives of the new z by the old one: how the belief follows the given camera.
     pub by_given: ParameterMatrix,
-    /// Squared Mahalanobis distance of what the pictures say from what was given, and its degrees of freedom.
+    /// Squared Mahalanobis distance between the camera by the pictures and the given one.
     pub surprise: f64,
-    /// Directions of z that the pictures say something about.
+    /// Degrees of freedom: number of directions of z that the pictures contain information about.
     pub freedom: f64,
 }
 
 impl CameraBelief {
-    /// A camera that is right on average.
+    /// The belief of a given calibration: no expected change.
     pub fn given(covariance: &CameraCovariance) -> CameraBelief {
-        // Correlations: the parameters' units differ by orders of magnitude.
+        // Correlations, because the parameters' units differ by orders of magnitude.
         let sigma = Parameters::from_fn(|i, _| covariance[(i, i)].max(0.0).sqrt());
         let inverse = sigma.map(|s| if s > 0.0 { 1.0 / s } else { 0.0 });
         let correlation = ParameterMatrix::from_fn(|i, j| covariance[(i, j)] * inverse[i] * inverse[j]);
@@ -41,17 +41,17 @@ impl CameraBelief {
         CameraBelief { mean: Parameters::zeros(), root }
     }
 
-    /// The directions of z that lead anywhere.
+    /// The directions of z that change any parameter.
     pub fn directions(&self) -> Vec<usize> {
         (0..self.root.ncols()).filter(|&i| self.root.column(i).amax() > 0.0).collect()
     }
 
-    /// Of the change of the camera's parameters.
+    /// Covariance of the change of the camera's parameters.
     pub fn covariance(&self) -> ParameterMatrix {
         self.root * self.root.transpose()
     }
 
-    /// With what these pictures say, the features' sigmas being `factor` times the stated ones.
+    /// The belief updated by the pixels of these pictures, with feature sigmas of `factor` times the stated ones.
     pub fn after(&self, pairs: &[&Pair], factor: f64) -> Option<Sharpened> {
         let (mut information, mut gradient) = (ParameterMatrix::zeros(), Parameters::zeros());
         for pair in pairs {
@@ -64,8 +64,8 @@ impl CameraBelief {
         let cholesky = (ParameterMatrix::identity() + learnt).cholesky()?;
         let z = -cholesky.solve(&(self.root.transpose() * gradient));
         let by_given = cholesky.l().try_inverse()?;
-        // The pictures alone place z with information `learnt`; given and said differ by (1 + 1/learnt) in each
-        // direction, and z is learnt/(1 + learnt) of their difference.
+        // The pictures alone determine z with information `learnt`. The difference between the given camera and
+        // theirs has the variance 1 + 1/learnt in each direction, and z is learnt/(1 + learnt) of this difference.
         let e = learnt.symmetric_eigen();
         let along = e.eigenvectors.transpose() * z;
         let (mut surprise, mut freedom) = (0.0, 0.0);
@@ -78,8 +78,8 @@ impl CameraBelief {
     }
 }
 
-/// What a covariance of the parameters, or the square of one change of them, means for the viewing rays: px rms over
-/// the image, after the rotation that a hand-eye transform makes up for.
+/// Effect of a covariance of the parameters, or of the square of one change of them, on the viewing rays: px rms over
+/// the image, after the rotation that a hand-eye transform can compensate.
 pub fn ray_error_px(camera: &Intrinsics, covariance: &ParameterMatrix) -> f64 {
     expected_ray_error(camera, covariance)
 }

@@ -1,5 +1,5 @@
-//! In: pairs of robot poses and pictures, a fit. Out: refusals that name what is wrong with the pairs:
-//! units, order, duplicates, one axis only.
+//! In: pairs of robot poses and pictures, a fit. Out: refusals that name the fault of the pairs: units, order,
+//! duplicates, rotation about one axis only.
 //! Frame and unit: mm, rad.
 
 use super::chance::{BY_CHANCE, chance};
@@ -9,7 +9,7 @@ use super::options::{HandEyeOptions, Mount};
 use super::otherwise;
 use crate::fault::{Fault, Result};
 
-/// Robot poses closer than this are the same pose: 1 µm and 0.001 degrees.
+/// Robot poses closer than this count as the same pose: 1 µm and 0.001 degrees.
 const SAME_MM: f64 = 1e-3;
 const SAME_RAD: f64 = 2e-5;
 
@@ -27,7 +27,7 @@ pub fn duplicates(pairs: &[Pair]) -> Vec<(String, String)> {
     out
 }
 
-/// Refuses what can be seen before any fit: too few poses, duplicates, no second axis.
+/// Refuses faults that are visible before any fit: too few poses, duplicates, rotation about one axis only.
 pub fn before(pairs: &[Pair], mount: Mount, o: &HandEyeOptions) -> Result<()> {
     if pairs.len() < o.min_pairs {
         return Err(Fault::refused(format!(
@@ -48,7 +48,7 @@ pub fn before(pairs: &[Pair], mount: Mount, o: &HandEyeOptions) -> Result<()> {
     let spread = axis_spread(&pairs.iter().collect::<Vec<_>>());
     let [first, second, _] = spread.map(|s| s.1.to_degrees());
     if second < o.min_second_axis_deg {
-        // Angles in another unit make a robot that hardly turns.
+        // Angles read in a wrong unit look like a robot that hardly rotates.
         if let Some(e) = otherwise::find(pairs, mount, false, 0, o).filter(|e| e.refuses) {
             return Err(e.fault("the poses turn about one axis only".into()));
         }
@@ -68,11 +68,11 @@ pub fn before(pairs: &[Pair], mount: Mount, o: &HandEyeOptions) -> Result<()> {
     Ok(())
 }
 
-/// Below this share of chance no other order of the poses is looked for.
+/// Below this ratio to chance, no other order of the poses is tried.
 const SURELY: f64 = 0.02;
 
 /// Refuses a fit that is no better than chance, that few pairs agree with, or that another notation, unit or order of
-/// the poses would make much better. Returns what would make the excluded pairs fit.
+/// the poses would improve much. Returns the explanation for the excluded pairs, if one was found.
 pub fn after(pairs: &[Pair], fit: &HandEyeFit, mount: Mount, o: &HandEyeOptions) -> Result<Option<String>> {
     let chosen: Vec<&Pair> = pairs.iter().zip(&fit.pairs).filter(|(_, r)| r.used).map(|(p, _)| p).collect();
     let used = chosen.len();
@@ -86,7 +86,7 @@ pub fn after(pairs: &[Pair], fit: &HandEyeFit, mount: Mount, o: &HandEyeOptions)
         100.0 * chance,
         100.0 * BY_CHANCE
     );
-    // Fewer than 60 % agreeing pairs could be a coincidence of wrong ones.
+    // Fewer than 60 % agreeing pairs could be a coincidence among wrong ones.
     if chance > BY_CHANCE || used * 10 < pairs.len() * 6 || used < o.min_pairs {
         return Err(otherwise::explain(pairs, what, mount, o));
     }
@@ -96,7 +96,7 @@ pub fn after(pairs: &[Pair], fit: &HandEyeFit, mount: Mount, o: &HandEyeOptions)
     }
 }
 
-/// For a pair that was left out: the picture whose pose it fits, if there is one.
+/// For an excluded pair: the picture whose pose it fits, if any.
 pub fn belongs_to(pairs: &[Pair], fit: &HandEyeFit, wrong: usize) -> Option<String> {
     let limit = 4.0 * fit.start.spread + 0.5;
     pairs

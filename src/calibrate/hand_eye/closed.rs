@@ -1,5 +1,5 @@
-//! In: board poses seen by the camera and the robot's poses, some of the pairs possibly wrong. Out:
-//! the hand-eye transform in closed form, which pairs agree with it, and what may be wrong.
+//! In: board poses seen by the camera and the robot's poses; some pairs may be wrong. Out: the hand-eye transform in
+//! closed form, and the pairs that agree with it.
 //! Frame and unit: near = what carries the camera, far = what carries the board; mm, rad.
 
 use crate::calibrate::measured_pose::MeasuredPose;
@@ -8,10 +8,10 @@ use crate::robot::Written;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 
-/// What carries the camera: the flange (eye in hand) or the base (eye to hand).
+/// Frame of the camera's carrier: the flange (eye in hand) or the base (eye to hand).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Near;
-/// What carries the board: the base (eye in hand) or the flange (eye to hand).
+/// Frame of the board's carrier: the base (eye in hand) or the flange (eye to hand).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Far;
 impl Frame for Near {
@@ -21,19 +21,19 @@ impl Frame for Far {
     const NAME: &'static str = "board's carrier";
 }
 
-/// One pair: what the robot said and what the camera saw.
+/// One pair: the robot's reported pose and the board seen by the camera.
 #[derive(Clone, Debug)]
 pub struct Pair {
     /// The robot's pose: flange_from_base with eye in hand, base_from_flange with eye to hand; mm.
     pub near_from_far: Rigid<Near, Far>,
-    /// The board's pose as the camera measured it.
+    /// The board's pose measured by the camera.
     pub seen: MeasuredPose,
-    /// The numbers that the robot's pose was read from; none of a pose that came over a wire.
+    /// The numbers that the robot's pose was read from; `None` for a pose received over a network connection.
     pub written: Option<Written>,
 }
 
 impl Pair {
-    /// A pair whose robot pose is what it is, in no notation.
+    /// A pair whose robot pose has no written notation.
     pub fn new(near_from_far: Rigid<Near, Far>, seen: MeasuredPose) -> Pair {
         Pair { near_from_far, seen, written: None }
     }
@@ -43,27 +43,28 @@ impl Pair {
     }
 }
 
-/// Both unknowns of the chain camera ← near ← far ← board.
+/// The two unknowns of the chain camera ← near ← far ← board.
 #[derive(Clone, Copy, Debug)]
 pub struct Chain {
     /// The hand-eye transform, mm.
     pub near_from_camera: Rigid<Near, Camera>,
-    /// Where the board is fixed, mm.
+    /// Pose of the board on its carrier, mm.
     pub far_from_board: Rigid<Far, Board>,
 }
 
 impl Chain {
-    /// The board's pose that the chain expects for a robot pose.
+    /// The board pose that the chain expects for a robot pose.
     pub fn expected(&self, near_from_far: &Rigid<Near, Far>) -> Rigid<Camera, Board> {
         self.near_from_camera.inverse() * *near_from_far * self.far_from_board
     }
-    /// Distance between the seen and the expected board, rms over its corners, mm.
+    /// Distance between the seen and the expected board, rms over its landmarks, mm.
     pub fn misfit(&self, pair: &Pair) -> f64 {
         pair.seen.displacement(&self.expected(&pair.near_from_far))
     }
 }
 
-/// Indices of the pairs in an order that does not depend on the recording's: by the robot's place.
+/// Indices of the pairs in an order that does not depend on the recording: sorted by the robot's position, then the
+/// board's.
 pub fn canonical_order(pairs: &[Pair]) -> Vec<usize> {
     let key = |i: usize| {
         let (a, b) = (pairs[i].near_from_far.translation, pairs[i].seen.camera_from_board.translation);
@@ -82,12 +83,12 @@ fn motion(a: &Pair, b: &Pair) -> (Rigid<Near, Near>, Rigid<Camera, Camera>) {
     (a.near_from_far * b.near_from_far.inverse(), a.seen.camera_from_board * b.seen.camera_from_board.inverse())
 }
 
-/// Rotations this near to half a turn have two logarithms; their pairs are left out (rad).
+/// Rotations beyond this angle are too close to half a turn, where the logarithm is ambiguous; their pairs are
+/// excluded (rad).
 const HALF_TURN: f64 = 3.05;
 
-/// AX = XB over all pairs of pairs: the rotation by \[park94\] (the polar factor of Σ α βᵀ), then
-/// the translation, linear (docs/math.md, Hand-eye (2) to (4)). `None` where the robot turned
-/// about fewer than two axes.
+/// AX = XB over all pairs of pairs: the rotation by \[park94\] (the polar factor of Σ α βᵀ), then the translation by
+/// a linear solve (docs/math.md, Hand-eye (2) to (4)). `None` if the robot rotated about fewer than two axes.
 pub fn park_martin(pairs: &[&Pair]) -> Option<Chain> {
     let near_from_camera = {
         let mut m = Mat3::zeros();
@@ -95,7 +96,7 @@ pub fn park_martin(pairs: &[&Pair]) -> Option<Chain> {
             m += log(&a.rotation) * log(&b.rotation).transpose();
         });
         let s = m.singular_values();
-        // Two axes make two singular values; the third follows from the right hand.
+        // Two axes give two singular values; the third direction follows from right-handedness.
         if !(s[1] > 1e-6 * s[0].max(1e-12)) {
             return None;
         }
@@ -105,8 +106,8 @@ pub fn park_martin(pairs: &[&Pair]) -> Option<Chain> {
     Some(Chain { near_from_camera, far_from_board: mean_board(pairs, &near_from_camera) })
 }
 
-/// The factor by which the robot's lengths must be multiplied to agree with the board's: 1 where
-/// both are in the same unit, 1000 for poses in metres, the ratio of squares for a wrong board.
+/// Factor that converts the robot's lengths to the board's: 1 for equal units, 1000 for poses in metres, the ratio of
+/// the square sizes for a wrong board.
 pub fn robot_scale(pairs: &[&Pair]) -> Option<f64> {
     let chain = park_martin(pairs)?;
     Some(translation(pairs, &chain.near_from_camera.rotation, true)?.1)
@@ -123,7 +124,7 @@ fn for_each_motion(pairs: &[&Pair], mut f: impl FnMut(&Rigid<Near, Near>, &Rigid
     }
 }
 
-/// (R_A − I) t = R_X t_B − s t_A for all motions; s = 1 unless asked for.
+/// (R_A − I) t = R_X t_B − s t_A for all motions; s = 1 unless `with_scale`.
 fn translation(pairs: &[&Pair], rotation: &Mat3, with_scale: bool) -> Option<(Vec3, f64)> {
     let mut h = DMatrix::<f64>::zeros(4, 4);
     let mut g = DVector::<f64>::zeros(4);
@@ -150,7 +151,7 @@ fn translation(pairs: &[&Pair], rotation: &Mat3, with_scale: bool) -> Option<(Ve
     t.iter().all(|x| x.is_finite()).then_some((t, 1.0))
 }
 
-/// The board on its carrier: mean of what each pair says (chordal mean of rotations).
+/// Pose of the board on its carrier: mean over all pairs (chordal mean of the rotations).
 fn mean_board(pairs: &[&Pair], near_from_camera: &Rigid<Near, Camera>) -> Rigid<Far, Board> {
     let each: Vec<Rigid<Far, Board>> =
         pairs.iter().map(|p| p.near_from_far.inverse() * *near_from_camera * p.seen.camera_from_board).collect();
@@ -173,9 +174,9 @@ pub struct Agreement {
     pub spread: f64,
 }
 
-/// The closed form on the largest set of pairs that agree: least median of squares over triples
-/// \[rousseeuw84\], every triple up to 25 pairs and 3000 drawn ones beyond. Up to half of the pairs
-/// may be wrong. The pairs must come in an order that does not depend on the recording's.
+/// The closed form on the largest set of agreeing pairs: least median of squares over triples \[rousseeuw84\], all
+/// triples up to 25 pairs and 3000 drawn ones beyond. Up to half of the pairs may be wrong. The pairs must come in an
+/// order that does not depend on the recording.
 pub fn agree(pairs: &[Pair], seed: u64) -> Option<Agreement> {
     let n = pairs.len();
     if n < 3 {
@@ -185,7 +186,7 @@ pub fn agree(pairs: &[Pair], seed: u64) -> Option<Agreement> {
     let mut consider = |c: &[usize]| {
         let Some(chain) = park_martin(&c.iter().map(|&i| &pairs[i]).collect::<Vec<_>>()) else { return };
         let mut misfits: Vec<f64> = pairs.iter().map(|p| chain.misfit(p)).collect();
-        // The triple's own three fit too well to count as witnesses.
+        // The three pairs of the triple fit too well to count in the median.
         let middle = (n / 2 + 1).min(n - 1);
         let (_, &mut median, _) = misfits.select_nth_unstable_by(middle, f64::total_cmp);
         if best.as_ref().is_none_or(|b| median < b.0) {
@@ -226,8 +227,8 @@ pub fn agree(pairs: &[Pair], seed: u64) -> Option<Agreement> {
     (agreeing.len() >= 3).then_some(Agreement { chain, agreeing, spread })
 }
 
-/// Spread of the rotation axes between the pairs: for each principal direction (near frame, most
-/// used first) the rms rotation about it over all motions, rad.
+/// Spread of the rotation axes between the pairs. For each principal direction (near frame, the one with most
+/// rotation first) the rms rotation about it over all motions, rad.
 pub fn axis_spread(pairs: &[&Pair]) -> [(Vec3, f64); 3] {
     let mut m = Mat3::zeros();
     let mut n = 0.0;

@@ -1,4 +1,4 @@
-//! In: a hand-eye fit. Out: how far off a measured point will be, the camera's own error with it.
+//! In: a hand-eye fit. Out: the expected error of a measured point, with the camera's own error.
 //! Frame and unit: the camera's carrier, mm (docs/math.md, Hand-eye (12)).
 
 use super::fit::HandEyeFit;
@@ -8,18 +8,18 @@ use crate::camera::PARAMETERS;
 use crate::geometry::{Mat3, Vec3, skew};
 use nalgebra::{DMatrix, SMatrix};
 
-/// Expected error of a point on the optical axis, mm rms over the three axes together.
+/// Expected error of a point on the optical axis, rms over the length of its error vector, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExpectedError {
-    /// Of the point seen with the given camera; robot, pixels and that camera's error together.
+    /// For the point seen with the given camera: the errors of robot, pixels and that camera together.
     pub whole: f64,
-    /// The share of it that the given camera makes: its viewing ray and, by way of the fit, the hand-eye transform.
+    /// The given camera's share: by its viewing ray and, through the fit, by the hand-eye transform.
     pub from_camera: f64,
-    /// The same point seen with the camera that came out of the fit: the two belong together.
+    /// The same point seen with the camera that was fitted jointly; its errors are correlated with the chain's.
     pub with_joint_camera: f64,
 }
 
-/// Of a point at a distance along the optical axis, known by its pixel and its depth.
+/// Expected error at a distance along the optical axis, for a point known by its pixel and its depth.
 pub fn expected_error(fit: &HandEyeFit, distance: f64) -> ExpectedError {
     let point = Vec3::new(0.0, 0.0, distance);
     let rotation = fit.chain.near_from_camera.rotation;
@@ -27,7 +27,7 @@ pub fn expected_error(fit: &HandEyeFit, distance: f64) -> ExpectedError {
     by_chain.fixed_view_mut::<3, 3>(0, 0).copy_from(&Mat3::identity());
     by_chain.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(&(rotation * point)));
     let by_ray = rotation * seen_by_camera(fit, &point);
-    // What the given camera's error makes, and what pixels and robot make beside it.
+    // Contribution of the given camera's error, and of pixels and robot besides it.
     let follows = fit.by_camera * fit.by_camera.transpose();
     let rest = by_chain * (fixed(&fit.covariance) - follows) * by_chain.transpose();
     let by_given = by_chain * fit.by_camera + by_ray * fit.given.root;
@@ -44,7 +44,7 @@ pub fn expected_error(fit: &HandEyeFit, distance: f64) -> ExpectedError {
     }
 }
 
-/// How the point that a pixel and a depth stand for moves with the camera's parameters.
+/// Derivatives of the point with a given pixel and depth by the camera's parameters.
 fn seen_by_camera(fit: &HandEyeFit, point: &Vec3) -> SMatrix<f64, 3, PARAMETERS> {
     let mut out = SMatrix::<f64, 3, PARAMETERS>::zeros();
     let Some(at) = project(&fit.camera, point) else { return out };

@@ -1,5 +1,5 @@
-//! In: pairs of robot poses and boards, a start. Out: the chain, the camera that goes with it and the robot's noise,
-//! each fitted to the others.
+//! In: pairs of robot poses and boards, a start. Out: the chain, its camera and the robot's noise, each fitted with
+//! the others.
 //! Frame and unit: see `closed`; mm, rad (docs/math.md, Hand-eye (6) to (9)).
 
 use super::camera_belief::{CameraBelief, Sharpened};
@@ -13,8 +13,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// One round of variance components at a fitted chain.
 ///
-/// The camera's own error moves all boards together; it is part of the known covariance, so that
-/// it is not taken for noise of the robot.
+/// The camera's own error moves all boards together. It is part of the known covariance, so that it is not attributed
+/// to the robot's noise.
 fn components(
     pairs: &[&Pair],
     chain: &Chain,
@@ -25,7 +25,7 @@ fn components(
 ) -> Option<Noise> {
     let boards_open = open(pairs);
     let (mut model, parts) = model(pairs, chain, noise, mount, camera, o);
-    // Below these the robot's noise no longer matters beside any camera's.
+    // Below these values the robot's noise is negligible beside any camera's.
     let (floor_mm, floor_rad) = (1e-4f64, 1e-6f64);
     let (mut theta, mut floor) = (Vec::new(), Vec::new());
     let mut estimated = Vec::new();
@@ -56,8 +56,8 @@ fn components(
     Some(out)
 }
 
-/// The model of a chain's residuals without its parts, and the parts of the robot's places, its turns and the boards
-/// for a variance of 1.
+/// The model of a chain's residuals without its parts, and its parts for a variance of 1: the robot's positions, its
+/// rotations and the boards.
 fn model(
     pairs: &[&Pair],
     chain: &Chain,
@@ -103,7 +103,7 @@ fn model(
     (model, parts)
 }
 
-/// Whether the boards' own scatter is left open: their poses were given without sigmas.
+/// Whether the boards' own scatter is unknown: their poses were given without sigmas.
 fn open(pairs: &[&Pair]) -> bool {
     pooled_factor(pairs.iter().map(|p| &p.seen)).is_none()
 }
@@ -112,11 +112,11 @@ fn open(pairs: &[&Pair]) -> bool {
 pub(in crate::calibrate) struct Fitted {
     pub refined: Refined,
     pub noise: Noise,
-    /// The camera after the pairs' pixels, before the robot's poses.
+    /// The camera updated by the pairs' pixels, before the robot's poses are used.
     pub camera: Sharpened,
 }
 
-/// Alternates the fit and the noise until both stand still. `None` where something is not determined.
+/// Alternates between fit and noise until both are stable. `None` if something is not determined.
 pub(in crate::calibrate) fn fit(
     pairs: &[&Pair],
     start: &Chain,
@@ -138,8 +138,8 @@ pub(in crate::calibrate) fn fit(
             break;
         }
     }
-    // That the rounds ran out says nothing against the chain: of a robot too exact to be seen the noise shrinks on
-    // and on.
+    // Reaching the limit of rounds is no fault of the chain: for a robot whose noise is too small to be seen, the
+    // estimate keeps shrinking.
     let refined = refine(pairs, &chain, &noise, mount, &camera.belief)?;
     Some(Fitted { refined, noise, camera })
 }

@@ -1,6 +1,6 @@
-//! In: what a person may choose about a hand-eye solve. Out: the choice, checked; where the camera is mounted; the
-//! noise that is assumed.
-//! Frame and unit: mm, degrees where the name says so.
+//! In: a user's settings for the hand-eye solve. Out: the checked settings; the mount of the camera; the assumed
+//! noise.
+//! Frame and unit: mm; degrees where the name states them.
 
 use super::closed::{Chain, Far, Near};
 use crate::fault::{Fault, Result};
@@ -13,16 +13,16 @@ pub struct HandEyeOptions {
     pub robot_sigma_mm: Option<f64>,
     /// Sigma of the robot's orientation per axis, degrees; `None`: estimated. 1e-7..=5.
     pub robot_sigma_deg: Option<f64>,
-    /// A pair is wrong where its squared Mahalanobis distance (6 degrees of freedom) exceeds this;
-    /// 26.1 leaves one good pair in 5,000 out. 12..=1000.
+    /// A pair counts as wrong if its squared Mahalanobis distance (6 degrees of freedom) exceeds this; 26.1 excludes
+    /// one good pair in 5,000. 12..=1000.
     pub gate: f64,
     /// Rotation about the second axis (rms over all motions) below which the result is refused, degrees; 0.1..=30.
     pub min_second_axis_deg: f64,
-    /// Fewest agreeing pairs; 3..=1000.
+    /// Smallest number of agreeing pairs; 3..=1000.
     pub min_pairs: usize,
-    /// What states the board's lengths, as a message names it.
+    /// Source of the board's lengths, as named in messages.
     pub board_length: String,
-    /// Seed of the draws among more than 25 pairs.
+    /// Seed of the random triples for more than 25 pairs.
     pub seed: u64,
 }
 
@@ -41,7 +41,7 @@ impl Default for HandEyeOptions {
 }
 
 impl HandEyeOptions {
-    /// Refuses values out of the ranges that the fields state.
+    /// Refuses values outside the ranges stated at the fields.
     pub fn check(&self) -> Result<()> {
         let bad = |name: &str, value: f64, range: &str| {
             Err(Fault::usage(format!("{name} is {value}, {range} is allowed")).next("choose a value in that range"))
@@ -65,19 +65,19 @@ impl HandEyeOptions {
     }
 }
 
-/// Standard deviations of the robot's reported poses per axis, and the factor of the features' sigmas; for board poses
-/// that were given without sigmas the factor is their turn's, rad.
+/// Standard deviations of the robot's reported poses per axis, and the factor of the features' sigmas. For board
+/// poses given without sigmas, the factor is the sigma of their rotation, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// Position, per axis, mm.
     pub robot_mm: f64,
     /// Orientation, per axis, rad.
     pub robot_rad: f64,
-    /// Times a feature's stated sigma is its true one; rad for board poses without sigmas.
+    /// Factor from a feature's stated sigma to its true one; rad for board poses without sigmas.
     pub feature_factor: f64,
 }
 
-/// Where the flange is, as the noise of its pose moves the board in the picture.
+/// The side of the chain on which the flange moves.
 #[derive(
     Clone,
     Copy,
@@ -93,9 +93,9 @@ pub struct Noise {
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Mount {
-    /// On the camera's side: it carries the camera, and the board stands still.
+    /// The flange carries the camera, and the board stands still.
     EyeInHand,
-    /// On the board's side: it carries the board, and the camera stands still.
+    /// The flange carries the board, and the camera stands still.
     EyeToHand,
 }
 
@@ -104,11 +104,11 @@ fn unknown(word: &str) -> String {
 }
 
 impl Mount {
-    /// As station.toml and the command line call it.
+    /// Name in station.toml and on the command line.
     pub fn name(self) -> &'static str {
         self.into()
     }
-    /// The robot's pose as the chain needs it.
+    /// The robot's pose in the form that the chain uses.
     pub fn near_from_far(self, base_from_flange: &Rigid<Base, Flange>) -> Rigid<Near, Far> {
         let inverse = base_from_flange.inverse();
         match self {
@@ -116,7 +116,7 @@ impl Mount {
             Mount::EyeToHand => Rigid::new(base_from_flange.rotation, base_from_flange.translation),
         }
     }
-    /// The robot's pose of a pair.
+    /// The inverse of [`Mount::near_from_far`]: the robot's pose of a pair.
     pub fn base_from_flange(self, near_from_far: &Rigid<Near, Far>) -> Rigid<Base, Flange> {
         let inverse = near_from_far.inverse();
         match self {

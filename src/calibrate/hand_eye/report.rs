@@ -1,5 +1,5 @@
-//! In: a hand-eye fit and its pairs. Out: the verdict with reasons, figures and the next best pose,
-//! and the page a person reads; fit and verification apart.
+//! In: a hand-eye fit and its pairs. Out: the verdict with reasons, figures and the next best pose, and the report
+//! page; fit and verification are separate.
 //! Frame and unit: near = what carries the camera; mm, degrees, px.
 
 use super::camera_belief::ray_error_px;
@@ -17,12 +17,12 @@ use std::collections::BTreeMap;
 /// Names of the hand-eye covariance's parameters ([`crate::rig::HandEye`]).
 pub const HAND_EYE_NAMES: [&str; 6] = ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"];
 
-/// The covariance as the calibration file keeps it.
+/// The covariance as the calibration file stores it.
 pub fn covariance(fit: &HandEyeFit) -> Covariance {
     Covariance::new(&HAND_EYE_NAMES, &fit.covariance.view((0, 0), (6, 6)).into_owned())
 }
 
-/// Rotation about a second axis, degrees rms, at which a set of poses is usable and good.
+/// Rotation about a second axis, degrees rms, from which a set of poses is usable and good.
 const SECOND_AXIS_DEG: [f64; 2] = [8.0, 12.0];
 
 /// What a verdict rests on.
@@ -30,7 +30,7 @@ struct Evidence<'a> {
     fit: &'a HandEyeFit,
     pairs: &'a [Pair],
     used: Vec<&'a Pair>,
-    /// Axes that the poses turn about, and by how much, degrees rms.
+    /// The axes about which the poses rotate, and the rotation about each, degrees rms.
     spread: [(Vec3, f64); 3],
     error: ExpectedError,
     camera: SolvedCamera,
@@ -74,7 +74,7 @@ pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
 }
 
 impl Evidence<'_> {
-    /// Whether the poses turn about two axes, and are enough.
+    /// Checks that the poses rotate about two axes and are numerous enough.
     fn determined(&self, j: &mut Judgement) {
         let (second, used) = (self.spread[1].1, self.used.len());
         let [usable, good] = SECOND_AXIS_DEG;
@@ -100,7 +100,7 @@ impl Evidence<'_> {
         j.reasons.extend(self.fit.left_out_fit.clone());
     }
 
-    /// What the robot's poses, the camera and the boards' own pictures make of the error.
+    /// Contributions of the robot's poses, the camera and the boards' poses to the error.
     fn scatter(&self, j: &mut Judgement) {
         let (among, camera) = if self.pixels {
             ("", format!("; the camera's own uncertainty makes {:.3} mm of the error", self.error.from_camera))
@@ -118,11 +118,11 @@ impl Evidence<'_> {
         }
     }
 
-    /// The next best pose or picture.
+    /// Advises on the next best pose or picture.
     fn advise(&self, j: &mut Judgement) {
         let ExpectedError { whole, from_camera, .. } = self.error;
         let good = SECOND_AXIS_DEG[1];
-        // The third axis is asked for only where the second one is well turned about.
+        // The third axis is requested only if the rotation about the second one suffices.
         let (axis, weak) = if self.spread[1].1 < good { self.spread[1] } else { self.spread[2] };
         j.advise(weak < good, || {
             format!(
@@ -179,13 +179,13 @@ impl Evidence<'_> {
     }
 }
 
-/// What became of the camera's parameters, which are solved along with their calibration as the prior.
+/// Change of the camera's parameters, which are fitted too, with their calibration as the prior.
 struct SolvedCamera {
-    /// By how much its viewing rays moved, and how well they were known before and after, px.
+    /// Change of its viewing rays, and their uncertainty before and after, px.
     moved: f64,
     before: f64,
     after: f64,
-    /// Squared distance of the solved parameters from the calibrated ones, and what is expected of it.
+    /// Squared distance of the solved parameters from the calibrated ones, and its expected value.
     surprise: f64,
     freedom: f64,
 }
@@ -204,13 +204,13 @@ impl SolvedCamera {
         }
     }
 
-    /// The calibrated camera was not taken as exact.
+    /// True if the calibrated camera was not taken as exact.
     fn is_free(&self) -> bool {
         self.before > 0.0
     }
 
-    /// One good set in some thousands is called so \[wilson31\]: a chi-square variable over its freedom, to the third
-    /// root, is normal.
+    /// Whether the pictures contradict the calibrated camera: one good set in several thousand does by chance
+    /// \[wilson31\]. The cube root of a chi-square variable over its degrees of freedom is nearly normal.
     fn is_another(&self) -> bool {
         let SolvedCamera { surprise, freedom, .. } = *self;
         freedom > 0.0
@@ -238,7 +238,7 @@ impl SolvedCamera {
         });
     }
 
-    /// None where the camera was taken as exact.
+    /// Figures of the camera; empty if it was taken as exact.
     fn figures(&self) -> impl Iterator<Item = (String, f64)> {
         let all = [
             ("camera_change_px", self.moved),
@@ -252,12 +252,12 @@ impl SolvedCamera {
     }
 }
 
-/// Whether the boards were seen in pictures; false: their poses were given, and nothing is known in px.
+/// True if the boards were seen in pictures; false if their poses were given, so that nothing is known in px.
 fn in_pixels(pairs: &[Pair]) -> bool {
     pairs.iter().all(|p| p.seen.rms_px.is_finite())
 }
 
-/// The report: what was found, how it fits, how it predicts pictures that it did not see.
+/// The report page: the result, its fit, and its prediction of excluded pictures.
 pub fn page(fit: &HandEyeFit, pairs: &[Pair], quality: &Quality, carrier: &str) -> Page {
     let mut page = Page::new("Hand-eye calibration");
     page.verdict(quality);
@@ -310,7 +310,7 @@ pub fn page(fit: &HandEyeFit, pairs: &[Pair], quality: &Quality, carrier: &str) 
     page
 }
 
-/// The camera's place and turn with their sigmas.
+/// The camera's position and orientation with their sigmas.
 fn chain_rows(fit: &HandEyeFit, carrier: &str) -> Vec<Vec<String>> {
     let x = &fit.chain.near_from_camera;
     let [rz, ry, rx] = crate::robot::zyx_of(&x.rotation);
@@ -335,7 +335,7 @@ fn chain_rows(fit: &HandEyeFit, carrier: &str) -> Vec<Vec<String>> {
     rows
 }
 
-/// Axes of the turns from each used pose to the next.
+/// Axes of the rotations from each used pose to the next.
 fn turn_axes(fit: &HandEyeFit, pairs: &[Pair]) -> Vec<(Vec3, String)> {
     let mut axes = Vec::new();
     let used: Vec<(usize, &Pair)> = pairs.iter().enumerate().filter(|(i, _)| fit.pairs[*i].used).collect();

@@ -1,5 +1,5 @@
-//! In: board poses with their information and the robot's poses. Out: the hand-eye transform and the
-//! board's place by joint maximum likelihood, with the robot's noise, covariance and hold-out errors.
+//! In: board poses with their information matrices and the robot's poses. Out: the hand-eye transform and the board's
+//! pose on its carrier by joint maximum likelihood, with the robot's noise, covariance and hold-out errors.
 //! Frame and unit: see `closed`; mm, rad (docs/math.md, Hand-eye (1) to (10)).
 
 use super::camera_belief::CameraBelief;
@@ -28,7 +28,7 @@ fn distance2(fit: &Fitted, mount: Mount, pair: &Pair, used: bool) -> f64 {
     let own = step_covariance(&fit.refined.chain, pair, &fit.noise, mount);
     let fitted = j * fit.refined.covariance * j.transpose();
     let total = if used { own - fitted } else { own + fitted };
-    // Where a pair determines a direction alone its residual there is zero: its own noise stands in.
+    // If a pair alone determines a direction, its residual there is zero; its own noise is then used instead.
     let solve = |m: Matrix6<f64>| m.cholesky().map(|c| e.dot(&c.solve(&e)));
     solve(total).filter(|d| d.is_finite()).or_else(|| solve(own)).unwrap_or(f64::INFINITY)
 }
@@ -37,7 +37,8 @@ fn chosen<'a>(pairs: &'a [Pair], used: &[usize]) -> Vec<&'a Pair> {
     used.iter().map(|&i| &pairs[i]).collect()
 }
 
-/// Fits the agreeing pairs, and again with those within the gate until the same ones stay: their indices and the fit.
+/// Fits the agreeing pairs, then those within the gate, until the set no longer changes. Returns their indices and
+/// the fit.
 fn settle(
     pairs: &[Pair],
     agreement: &Agreement,
@@ -61,7 +62,7 @@ fn settle(
 }
 
 /// Solves for both unknowns of the chain. `camera` is the covariance of the camera's parameters
-/// ([`crate::calibrate::measured_pose::intrinsic_covariance`]). The result does not depend on the pairs' order.
+/// ([`crate::calibrate::measured_pose::intrinsic_covariance`]). The result does not depend on the order of the pairs.
 pub fn solve(
     pairs: &[Pair],
     mount: Mount,
@@ -76,7 +77,7 @@ pub fn solve(
     let agreement = start(pairs, o).map_err(|_| mispaired())?;
     let seen = || pairs.iter().map(|p| &p.seen);
     let scatter = agreement.spread.max(1e-3);
-    // The scatter of the board's corners seen as a rotation over the board's distance.
+    // The scatter of the board's landmarks, expressed as a rotation at the board's distance.
     let turn = scatter / mean(seen().map(|s| s.centre().norm()));
     let noise = Noise {
         robot_mm: o.robot_sigma_mm.unwrap_or(scatter),
@@ -124,7 +125,7 @@ pub fn solve(
     Ok(fit)
 }
 
-/// How a pair fits the whole, and how the others predict it.
+/// Residuals of a pair in the fit to all, and in the fit to the others.
 fn residual(
     fit: &Fitted,
     pair: &Pair,
@@ -137,7 +138,7 @@ fn residual(
         .after(others, fit.noise.feature_factor)
         .and_then(|c| Some((refine(others, &fit.refined.chain, &fit.noise, mount, &c.belief)?, c.belief)));
     let off = |r: &Refined, belief: &CameraBelief| {
-        // The board as that camera sees it: px and mm are then free of what the cameras differ by.
+        // The board as seen by that camera: px and mm then do not contain the difference between the cameras.
         let change = belief.mean + belief.root * r.z;
         let mut seen = pair.seen.clone();
         seen.camera_from_board = Twist::new((seen.by_intrinsics * change).as_slice()).moved(&seen.camera_from_board);
@@ -149,7 +150,7 @@ fn residual(
     PairResidual { name: pair.seen.name.clone(), used: false, distance2: 0.0, px, mm, holdout_px, holdout_mm }
 }
 
-/// The closed form in an order that does not depend on the recording's.
+/// The closed form on the pairs in an order that does not depend on the recording.
 fn start(pairs: &[Pair], o: &HandEyeOptions) -> Result<Agreement> {
     let order = canonical_order(pairs);
     let sorted: Vec<Pair> = order.iter().map(|&i| pairs[i].clone()).collect();

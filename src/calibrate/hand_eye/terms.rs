@@ -1,5 +1,5 @@
-//! In: a chain, pairs, noise. Out: the steps between seen and expected boards with their derivatives and
-//! covariance, and the chain that makes them least.
+//! In: a chain, pairs, noise. Out: the steps between seen and expected boards with their derivatives and covariance,
+//! and the chain that minimises them.
 //! Frame and unit: see `closed`; mm, rad (docs/math.md, Hand-eye (6), (7), (9)).
 
 use super::camera_belief::CameraBelief;
@@ -10,15 +10,15 @@ use crate::geometry::{LeftStep, Mat3, Twist, Vec3, skew};
 use crate::solve::{End, LmOptions, Problem, Residuals, lm};
 use nalgebra::{Matrix6, SMatrix, Vector6};
 
-/// Steps of one pair by the 12 unknowns, at the present chain.
+/// Step of one pair and its derivatives by the 12 unknowns, at the present chain.
 pub(in crate::calibrate) fn jacobian(chain: &Chain, pair: &Pair) -> (SMatrix<f64, 6, 1>, SMatrix<f64, 6, 12>) {
     let expected = chain.expected(&pair.near_from_far);
     let e = Twist::between(&pair.seen.camera_from_board, &expected).vector();
     let camera_from_near = chain.near_from_camera.rotation.transpose();
     let camera_from_far = camera_from_near * pair.near_from_far.rotation;
     let shift = skew(&Vec3::new(e[0], e[1], e[2]));
-    // w = -R_Xᵀ r and v = -R_Xᵀ dt for the camera's side; w = A r and v = A dt + g × A r for the
-    // board's, g the board's origin seen from the camera. The step before adds w × its translation.
+    // Camera's side: w = -R_Xᵀ r and v = -R_Xᵀ dt. Board's side: w = A r and v = A dt + g × A r, with g the board's
+    // origin in the camera frame. The preceding step adds w × its translation.
     let mut j = SMatrix::<f64, 6, 12>::zeros();
     j.fixed_view_mut::<3, 3>(0, 0).copy_from(&-camera_from_near);
     j.fixed_view_mut::<3, 3>(0, 3).copy_from(&(shift * camera_from_near));
@@ -30,7 +30,7 @@ pub(in crate::calibrate) fn jacobian(chain: &Chain, pair: &Pair) -> (SMatrix<f64
     (e, j)
 }
 
-/// Covariance of a step: the robot's translation and rotation, each for a sigma of 1.
+/// Covariances of a step by the robot's translation and by its rotation, each for a sigma of 1.
 pub(in crate::calibrate) fn robot_parts(flange: &Vec3) -> [Matrix6<f64>; 2] {
     let f = skew(flange);
     let mut translation = Matrix6::zeros();
@@ -48,34 +48,34 @@ pub(in crate::calibrate) fn step_covariance(chain: &Chain, pair: &Pair, noise: &
     pair.seen.covariance(noise.feature_factor) + t * noise.robot_mm.powi(2) + r * noise.robot_rad.powi(2)
 }
 
-/// The refinement: the robot's true poses are eliminated in closed form, which leaves whitened
-/// steps of six numbers a pair, and the numbers of the camera (docs/math.md, Hand-eye (6), (7), (9)).
+/// The refinement. The robot's true poses are eliminated in closed form, which leaves whitened steps of six numbers
+/// per pair, and the camera's parameters (docs/math.md, Hand-eye (6), (7), (9)).
 struct Refinement<'a> {
     pairs: &'a [&'a Pair],
     /// Inverse Cholesky factors of the steps' covariances.
     whiteners: Vec<Matrix6<f64>>,
     camera: &'a CameraBelief,
-    /// The unknowns that are not held: directions of the camera that lead nowhere are.
+    /// The free unknowns; directions of the camera's z without any effect are held fixed.
     free: Vec<usize>,
 }
 
-/// Unknowns: twelve of the chain, and the camera's.
+/// Number of unknowns: twelve of the chain, and the camera's.
 pub(in crate::calibrate) const UNKNOWNS: usize = 12 + PARAMETERS;
 
-/// A refined chain with the camera that goes with it.
+/// A refined chain with the camera that was fitted with it.
 pub(in crate::calibrate) struct Refined {
     pub chain: Chain,
     /// The camera's z in its belief.
     pub z: Parameters,
-    /// Of the chain's twelve numbers and the camera's z.
+    /// Covariance of the chain's twelve parameters and the camera's z.
     pub covariance: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
     pub cost: f64,
-    /// Whether it is a minimum.
+    /// Whether the fit is a minimum.
     pub end: End,
 }
 
-/// Steps from the boards, as the camera `mean + root z` would have seen them, to the expected ones, with
-/// derivatives by all unknowns.
+/// Steps from the boards, as seen by the camera `mean + root z`, to the expected ones, with derivatives by all
+/// unknowns.
 pub(in crate::calibrate) fn with_camera(
     chain: &Chain,
     z: &Parameters,

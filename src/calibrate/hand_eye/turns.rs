@@ -1,5 +1,5 @@
-//! In: pairs of robot poses and pictures of a board that looks the same after a turn. Out: every picture read
-//! with the same origin, resolved over the whole set, or a refusal.
+//! In: pairs of robot poses and pictures of a board that looks the same after a rotation. Out: every picture read
+//! with the same origin, resolved over the entire set, or a refusal.
 //! Frame and unit: see `closed`; mm, rad (docs/math.md, Hand-eye (11)).
 
 use super::closed::{Chain, Pair, canonical_order, park_martin};
@@ -8,30 +8,30 @@ use crate::fault::{Fault, Result};
 use crate::geometry::angle_between;
 use rand::SeedableRng;
 
-/// Two pictures' boards are rotated against each other as far as the robot turned between them. Readings that
-/// miss it by more than this cannot both be right: 5.7 degrees, a fifteenth of what two readings differ by, four times
-/// what a robot that scatters by a degree makes of it.
+/// The rotation between two pictures' boards has the same angle as the robot's rotation between them. Two readings
+/// whose angles differ by more than this cannot both be right: 5.7 degrees. That is a fifteenth of the difference
+/// between two readings, and four times the effect of a robot that scatters by a degree.
 const SAME_ANGLE: f64 = 0.1;
-/// Another reading of the set must fit this many times worse than the one that is taken.
+/// Any other reading of the set must fit this many times worse than the chosen one.
 const MARGIN: f64 = 3.0;
-/// Rotations nearer than this count as equally good, whatever their ratio: 0.6 degrees.
+/// Rotation misfits that differ by less than this count as equally good, whatever their ratio: 0.6 degrees.
 const FINE: f64 = 0.01;
-/// Triples that are tried among more than 25 pairs; all of them below.
+/// Number of triples that are tried for more than 25 pairs; with fewer pairs, all are tried.
 const DRAWN: usize = 3000;
 
-/// One way to read all pictures: a turn for each, and how well the set agrees with itself.
+/// One reading of all pictures: a rotation for each, and the consistency of the set.
 struct Reading {
     turns: Vec<usize>,
-    /// Pictures that agree with it; a wrong pair agrees with no reading.
+    /// Pictures that agree with this reading; a wrong pair agrees with no reading.
     agrees: Vec<bool>,
-    /// Medians over the pictures: rotation and place of the board against the chain.
+    /// Medians over the pictures: rotation and position misfit of the board to the chain.
     rad: f64,
     mm: f64,
 }
 
 impl Reading {
-    /// Reads every picture by the turn that fits the chain best. Rotations decide: readings of one picture
-    /// are a right angle or two apart, and a wrong unit of the poses does not touch them.
+    /// Reads every picture with the rotation that fits the chain best. Only rotations decide: readings of one picture
+    /// differ by one or two right angles, and a wrong length unit of the poses does not affect them.
     fn by(chain: &Chain, readings: &[Vec<Pair>]) -> Reading {
         let (mut turns, mut rads, mut mms) = (Vec::new(), Vec::new(), Vec::new());
         for one in readings {
@@ -44,7 +44,7 @@ impl Reading {
             rads.push(all[best]);
             mms.push(chain.misfit(&one[best]));
         }
-        // The triple that the chain was made of fits too well to count.
+        // The triple that determined the chain fits too well to count in the median.
         let middle = (readings.len() / 2 + 1).min(readings.len() - 1);
         let median = |values: &[f64]| {
             let mut sorted = values.to_vec();
@@ -55,7 +55,7 @@ impl Reading {
         let agrees = rads.iter().map(|r| *r < 4.0 * rad + 2.0 * FINE).collect();
         Reading { turns, agrees, rad, mm }
     }
-    /// The same but for a turn of all boards together, which is nothing but another name of the origin.
+    /// True if both readings differ only by a common rotation of all boards, which merely renames the origin.
     fn same(&self, other: &Reading, count: usize) -> bool {
         let both = (0..self.turns.len()).filter(|&i| self.agrees[i] && other.agrees[i]);
         let mut steps = both.map(|i| (self.turns[i] + count - other.turns[i]) % count);
@@ -64,7 +64,8 @@ impl Reading {
     }
 }
 
-/// Readings by the chains of all triples of pictures that robot and boards turn alike in, or of many drawn ones.
+/// Readings by the chains of all triples of pictures with equal rotation angles of robot and boards, or of many drawn
+/// triples.
 fn candidates(readings: &[Vec<Pair>], count: usize, seed: u64) -> Vec<Reading> {
     let n = readings.len();
     let mut found: Vec<Reading> = Vec::new();
@@ -96,12 +97,12 @@ fn candidates(readings: &[Vec<Pair>], count: usize, seed: u64) -> Vec<Reading> {
     found
 }
 
-/// Which of `turns` each picture has to be read with, so that all boards are one board in one place. The turn
-/// that is common to all pictures is free; as few as possible are read anew. Up to half of the pairs may be
-/// wrong; the result does not depend on the pairs' order.
+/// For each picture, the index of the rotation in `turns` that makes all boards one board in one pose. The rotation
+/// common to all pictures is free; as few pictures as possible are changed. Up to half of the pairs may be wrong. The
+/// result does not depend on the order of the pairs.
 ///
 /// # Errors
-/// Where no reading agrees with the robot's poses, or where two different ones do.
+/// No reading agrees with the robot's poses, or two different ones do.
 pub fn resolve(pairs: &[Pair], turns: &[Turn], seed: u64) -> Result<Vec<usize>> {
     let (n, count) = (pairs.len(), turns.len());
     if n < 3 || count < 2 {
@@ -139,7 +140,7 @@ pub fn resolve(pairs: &[Pair], turns: &[Turn], seed: u64) -> Result<Vec<usize>> 
     Ok(chosen)
 }
 
-/// The pair with its board read with another turn: what is measured in the camera frame stays as it is.
+/// The pair with its board read with another rotation; measurements in the camera frame do not change.
 pub fn read_with(pair: &Pair, turn: &Turn) -> Pair {
     let mut read = pair.clone();
     read.seen.camera_from_board = pair.seen.camera_from_board * turn.turn.inverse();

@@ -1,5 +1,5 @@
-//! Finds the inner corners of a ChArUco board (OpenCV's dictionaries) that are in view, with their ids, in pixels.
-//! Ids count row by row from the inner corner nearest to the board's origin.
+//! Finds the visible inner corners of a ChArUco board (OpenCV's dictionaries) with their ids, in pixels. Ids count
+//! row by row from the inner corner closest to the board's origin.
 
 use super::first_square::Turned;
 use super::grid::{FrontEnd, Grid, Prepared};
@@ -12,24 +12,24 @@ use crate::raster::Image;
 use crate::recording::BoardSpec;
 use calib_targets_charuco::{CharucoBoardSpec, CharucoDetector, CharucoParams, MarkerLayout};
 
-/// Corners at least, below which a view is refused: a pose wants 6 with some to spare.
+/// Smallest number of corners in an accepted view: a pose needs 6, and some redundancy.
 const FEWEST: usize = 8;
 
 /// The printed layout, as `BoardSpec::Charuco` states it.
 struct Layout {
     squares: [u32; 2],
-    /// Side of a marker as a share of a square.
+    /// Side of a marker as a share of a square's side.
     marker: f64,
 }
 
-/// A board as one order of its markers explains the picture.
+/// The interpretation of the picture by one order of the markers.
 struct Sight {
     view: BoardView,
-    /// Markers that stand where this order has them.
+    /// Number of markers that this order explains.
     markers: usize,
-    /// Grey levels of the picture, as a share of full scale.
+    /// Range of the picture's grey levels as a share of full scale.
     span: f64,
-    /// Why nothing was found; empty where something was.
+    /// Why nothing was found; empty if the board was found.
     reason: String,
 }
 
@@ -60,10 +60,10 @@ pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<B
     }
 }
 
-/// The order of markers that explains the picture, of a board whose first square is not stated.
+/// Chooses the order of markers that explains the picture, for a board whose first square is not stated.
 ///
 /// # Errors
-/// Both orders explain it: the columns that would tell are out of view.
+/// Both orders explain it: the columns that would distinguish them are out of view.
 fn choose(
     board: &BoardSpec,
     black: Option<Sight>,
@@ -76,7 +76,7 @@ fn choose(
         return Ok(Some(black));
     }
     let Some(white) = white()? else { return Ok(Some(black)) };
-    // Of a board that is read a column off, the corners of its outer column are not found: two or more.
+    // If a board is read shifted by a column, the corners of its outer column are missing: at least two.
     let more = |a: &Sight, b: &Sight| a.markers > b.markers || a.view.points.len() > b.view.points.len() + 1;
     match (more(&white, &black), more(&black, &white)) {
         (true, false) => Ok(Some(white)),
@@ -95,7 +95,7 @@ fn choose(
     }
 }
 
-/// Markers that must be seen where these corners are: half of the squares with a corner at each corner.
+/// Number of markers that must be visible between these corners: half of the squares with all four corners found.
 fn markers_between(view: &BoardView, layout: &Layout) -> usize {
     let columns = layout.squares[0] as usize - 1;
     let mut seen = vec![false; columns * (layout.squares[1] as usize - 1)];
@@ -104,7 +104,7 @@ fn markers_between(view: &BoardView, layout: &Layout) -> usize {
     whole.filter(|k| [0, 1, columns, columns + 1].iter().all(|step| seen[k + step])).count() / 2
 }
 
-/// Looks for a board whose first square is known.
+/// Searches for a board whose first square is known.
 fn look(
     image: &Image,
     grey: &Grey,
@@ -122,7 +122,7 @@ fn look(
     for &shrink in shrinks {
         let prepared = Prepared::new(image, grey, shrink);
         best.span = prepared.span;
-        // Radon candidates carry no strength that the marker detector could judge: two front ends.
+        // Radon candidates carry no strength for the marker detector to judge, so only two front ends are used.
         for front_end in [FrontEnd::Plain, FrontEnd::Enlarged] {
             let candidates = front_end.candidates(&prepared.view());
             let found = match detector.detect_with_corners(&prepared.view(), &candidates) {
@@ -134,7 +134,7 @@ fn look(
             };
             let mut grid = Grid { columns, rows, corners: vec![None; columns * rows] };
             for c in &found.corners {
-                // Positions on the board were given in squares: corner (1, 1) is the first inner one.
+                // The detector was given positions in squares: corner (1, 1) is the first inner one.
                 let at = [c.target_position.x.round() as usize, c.target_position.y.round() as usize];
                 let [nx, ny] = turned.squares().map(|n| n as usize);
                 if (1..nx).contains(&at[0]) && (1..ny).contains(&at[1]) {
@@ -147,7 +147,7 @@ fn look(
             if best.view.points.len() < view.points.len() {
                 (best.view, best.markers) = (BoardView { begins_white, ..view }, found.markers.len());
             }
-            // The enlarged picture is for boards that the plain one hardly shows.
+            // The enlarged picture is only for boards that the plain one hardly shows.
             if best.view.points.len() >= 3 * FEWEST {
                 break;
             }
@@ -170,9 +170,9 @@ fn detector(board: &BoardSpec, layout: &Layout, turned: &Turned) -> Result<Charu
     })
 }
 
-/// Refines what was found and lets the lattice grow over the board.
+/// Refines the corners found and grows the lattice over the board.
 fn refine(grid: &mut Grid, layout: &Layout, grey: &Grey, options: &FindOptions) -> BoardView {
-    // The white margin round a marker, less a quarter for blur.
+    // The white margin around a marker, less a quarter for blur.
     let margin = 0.75 * 0.5 * (1.0 - layout.marker);
     let window = Window { reach: options.reach, longest_px: options.longest_px, margin };
     let points = grown(grid, grey, &window, options.band_px)

@@ -1,4 +1,4 @@
-//! In: a picture and the number of inner corners. Out: all of them with their ids, or why not.
+//! In: a picture and the number of inner corners. Out: all of them with their ids, or the reason for a failure.
 //! Frame and unit: pixels; ids row by row from the board's first inner corner.
 
 use super::grid::{FrontEnd, Grid, Prepared, lattices};
@@ -10,11 +10,11 @@ use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
 use crate::raster::Image;
 
-/// Corners from which a lattice may grow: what it becomes is verified on the picture, corner by corner, and must be
-/// the whole board.
+/// Smallest number of corners from which a lattice is grown. The result is verified in the picture, corner by corner,
+/// and must be the complete board.
 const SEED: usize = 12;
 
-/// Finds a chessboard that is wholly in view.
+/// Finds a chessboard that is completely in view.
 pub fn find(image: &Image, corners: [u32; 2], black_first: bool, options: &FindOptions) -> Result<BoardView> {
     let (columns, rows) = (corners[0] as usize, corners[1] as usize);
     let grey = Grey::new(image);
@@ -28,7 +28,7 @@ pub fn find(image: &Image, corners: [u32; 2], black_first: bool, options: &FindO
         best_span = prepared.span;
         for front_end in FrontEnd::ALL {
             let candidates = front_end.candidates(&prepared.view());
-            // The strength floor belongs to the ChESS response; the Radon one has no fixed scale.
+            // The strength threshold applies to the ChESS response; the Radon response has no fixed scale.
             let floor = (front_end == FrontEnd::Radon).then_some(0.0);
             for mut grid in lattices(&candidates, floor) {
                 grid.corners.iter_mut().flatten().for_each(|c| *c = prepared.to_full(c));
@@ -44,8 +44,8 @@ pub fn find(image: &Image, corners: [u32; 2], black_first: bool, options: &FindO
     Err(why_not(best.as_ref(), columns, rows, best_span, &grey))
 }
 
-/// The view, where the lattice has the extent asked for and every corner stands the refinement. Second try: corners
-/// of the background dropped, corners that were missed found where their neighbours put them.
+/// The view, if the lattice has the requested extent and every corner can be refined. The second attempt drops
+/// corners of the background and searches for missed corners where their neighbours predict them.
 fn accept(
     grid: &Grid,
     columns: usize,
@@ -57,15 +57,15 @@ fn accept(
 ) -> Result<Option<BoardView>> {
     let whole = whole(grid, columns, rows, grey, window, options);
     let Some(mut found) = whole.or_else(|| mended(grid, columns, rows, grey, window, options)) else { return Ok(None) };
-    // Contrast of corner (i, j) has the sign of its lower right square, which is alternately coloured;
-    // a lattice that slipped by one somewhere would show it here.
+    // The contrast of corner (i, j) has the sign of its lower right square, and the colours alternate. A lattice
+    // shifted by one somewhere would violate this.
     let bright = |k: usize, c: &Corner| (c.contrast > 0.0) != ((k % columns + k / columns) % 2 == 1);
     let mut all = found.corners.iter().enumerate().filter_map(|(k, c)| Some(bright(k, c.as_ref()?)));
     let Some(first_bright) = all.next() else { return Ok(None) };
     if !all.all(|b| b == first_bright) || !found.grid.fill_gaps(1.0) {
         return Ok(None);
     }
-    // A corner may be hidden, not out of view: of a board that goes on beyond the picture nobody knows the rest.
+    // A corner may be hidden but not out of view: if the board continues beyond the picture, its extent is unknown.
     let inside = |p: &Vec2| p.x > 0.0 && p.y > 0.0 && p.x < grey.width as f64 - 1.0 && p.y < grey.height as f64 - 1.0;
     let hidden = found.grid.corners.iter().zip(&found.corners).filter(|(_, c)| c.is_none());
     if !hidden.filter_map(|(place, _)| place.as_ref()).all(inside) {
@@ -74,7 +74,7 @@ fn accept(
     orient(&found, first_bright, black_first).map(Some)
 }
 
-/// A lattice of the extent asked for with what was refined of it.
+/// A lattice of the requested extent with its refined corners.
 struct Found {
     grid: Grid,
     corners: Vec<Option<Corner>>,
@@ -99,8 +99,8 @@ fn whole(
     corners.iter().all(Option::is_some).then_some(Found { grid: turned, corners })
 }
 
-/// Grows the lattice as far as the picture shows the board, a line beyond what was asked for at least: a larger board
-/// is not this one. A few corners may stay unseen (glare).
+/// Grows the lattice as far as the picture shows the board, at least one line beyond the requested extent, because a
+/// larger board must be refused. A few corners may remain unseen (glare).
 fn mended(
     grid: &Grid,
     columns: usize,
@@ -128,7 +128,7 @@ fn mended(
     if (found.grid.columns, found.grid.rows) != (columns, rows) {
         let places = Grid { corners: (0..count).map(|k| Some(Vec2::new(k as f64, 0.0))).collect(), ..found.grid };
         let order = places.quarter_turn();
-        // The quadrant between the axes is the next one after a quarter turn, and of the other colour.
+        // After a quarter turn, the quadrant between the axes is the next one, which has the opposite colour.
         let turned = |c: Corner| Corner { contrast: -c.contrast, ..c };
         found.corners = order.corners.iter().flatten().map(|k| found.corners[k.x as usize].map(turned)).collect();
         found.grid = Grid {
@@ -142,16 +142,16 @@ fn mended(
     (fits && missing <= options.gaps * count as f64).then_some(found)
 }
 
-/// Chooses the turn at which the square outside the first corner has its colour.
+/// Chooses the rotation at which the square outside the first corner has the described colour.
 fn orient(found: &Found, first_bright: bool, black_first: bool) -> Result<BoardView> {
     let (columns, rows) = (found.grid.columns, found.grid.rows);
-    // The square outside the first corner and the one inside it (diagonally) have the same colour.
+    // The square outside the first corner and the diagonally opposite one inside have the same colour.
     let as_found = first_bright != black_first;
     let grid = Grid { columns, rows, corners: (0..columns * rows).map(|k| Some(Vec2::new(k as f64, 0.0))).collect() };
     let half = grid.quarter_turn().quarter_turn();
     let half_keeps_colour = (columns + rows) % 2 == 0;
     let square = columns == rows;
-    // n inner corners are n + 1 squares: a quarter turn moves a black corner square onto a white one where n is odd.
+    // n inner corners mean n + 1 squares: for odd n, a quarter turn moves a black corner square onto a white one.
     let quarter_keeps_colour = square && columns.is_multiple_of(2);
     let chosen = match (as_found, half_keeps_colour, square) {
         (true, _, _) => grid,
@@ -169,7 +169,8 @@ fn orient(found: &Found, first_bright: bool, black_first: bool) -> Result<BoardV
             )));
         }
     };
-    // Where a turn changes nothing, the picture's upper left decides for now; the view says so.
+    // If a rotation changes nothing, the corner closest to the picture's upper left comes first for now; the view is
+    // marked as ambiguous.
     let ambiguous = half_keeps_colour;
     let chosen = if ambiguous { nearest_to_top_left(chosen, &found.grid, quarter_keeps_colour) } else { chosen };
     let points = chosen
@@ -185,7 +186,8 @@ fn orient(found: &Found, first_bright: bool, black_first: bool) -> Result<BoardV
     Ok(BoardView { points, ambiguous, ..BoardView::default() })
 }
 
-/// `order` holds indices into `places`, whose corners are all known.
+/// Of the equivalent orders, the one whose first corner is closest to the picture's upper left. `order` holds indices
+/// into `places`, whose corners are all known.
 fn nearest_to_top_left(order: Grid, places: &Grid, quarters: bool) -> Grid {
     let first = |g: &Grid| {
         let p = places.corners[g.corners[0].expect("full").x as usize].expect("full");
@@ -202,7 +204,7 @@ fn nearest_to_top_left(order: Grid, places: &Grid, quarters: bool) -> Grid {
     best
 }
 
-/// The likely reason for not finding the board.
+/// The likely reason why the board was not found.
 fn why_not(best: Option<&Grid>, columns: usize, rows: usize, span: f64, grey: &Grey) -> Fault {
     let wanted = format!("no chessboard of {columns}x{rows} inner corners was found");
     if span < 0.06 {
@@ -226,7 +228,7 @@ fn why_not(best: Option<&Grid>, columns: usize, rows: usize, span: f64, grey: &G
         let border = 1.3 * pitch;
         p.x < border || p.y < border || p.x > grey.width as f64 - border || p.y > grey.height as f64 - border
     });
-    // A complete lattice that is larger than the one asked for is no board that was cut off.
+    // A complete lattice that is larger than the requested one is not a board that was cut off.
     if grid.count() == c * r && c * r >= wc * wr && (!cut || (c >= wc && r >= wr && (c, r) != (wc, wr))) {
         return Fault::refused(seen)
             .cause(WRONG_SIZE)
@@ -250,7 +252,7 @@ mod tests {
     use crate::geometry::Vec3;
     use crate::recording::BoardSpec;
 
-    /// Labels run in any direction; a corner under glare makes the lattice one that has to be mended.
+    /// Labels run in any direction; a corner under glare makes the lattice incomplete, so that it has to be mended.
     #[test]
     fn a_mended_lattice_has_its_origin_whichever_way_its_labels_run() {
         let (width, height) = (640, 480);

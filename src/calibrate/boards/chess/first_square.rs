@@ -1,8 +1,10 @@
-//! Boards with markers for a detector that only knows boards whose first square is black and whose first id is 0.
+//! Adapts boards with markers to a detector that only supports boards whose first square is black and whose first id
+//! is 0.
 //!
-//! OpenCV before 4.6 drew boards with an even number of rows from a white square on. After a half turn (columns odd)
-//! or a quarter turn (columns even) such a board begins with a black square. Its markers then stand turned and in
-//! another order; a dictionary of their turned codes in that order makes it a board that the detector knows.
+//! OpenCV before 4.6 drew boards with an even number of rows starting with a white square. After a half turn (odd
+//! columns) or a quarter turn (even columns) such a board starts with a black square. Its markers are then rotated
+//! and in another order. A dictionary of their rotated codes in that order makes it a board that the detector
+//! supports.
 
 use crate::fault::{Fault, Result};
 use crate::recording::{BoardSpec, Markers};
@@ -10,7 +12,7 @@ use calib_targets_charuco::Dictionary;
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
-/// How the board is turned for the detector.
+/// Rotation of the board for the detector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Turn {
     None,
@@ -18,17 +20,16 @@ enum Turn {
     Half,
 }
 
-/// A board as the detector gets it.
+/// A board in the form that the detector gets.
 #[derive(Clone, Copy, Debug)]
 pub struct Turned {
     turn: Turn,
-    /// Of the board as it is described: columns, rows.
+    /// Columns and rows of the board as described.
     squares: [u32; 2],
 }
 
 impl Turned {
-    /// `None` for a board that cannot be turned so that it begins with a black square: white first, columns and rows
-    /// odd.
+    /// `None` for a board that no rotation makes start with a black square: white first, columns and rows odd.
     pub fn of(squares: [u32; 2], white: bool) -> Option<Turned> {
         let turn = match (white, squares[0].is_multiple_of(2), squares[1].is_multiple_of(2)) {
             (false, ..) => Turn::None,
@@ -39,13 +40,13 @@ impl Turned {
         Some(Turned { turn, squares })
     }
 
-    /// Columns and rows of the turned board.
+    /// Columns and rows of the rotated board.
     pub fn squares(&self) -> [u32; 2] {
         let [c, r] = self.squares;
         if self.turn == Turn::Quarter { [r, c] } else { [c, r] }
     }
 
-    /// Where a corner of the turned board, in squares from its origin, lies on the board as it is described.
+    /// Position on the described board of a corner of the rotated board, both in squares from the origin.
     pub fn back(&self, [x, y]: [usize; 2]) -> [usize; 2] {
         let [c, r] = self.squares.map(|n| n as usize);
         match self.turn {
@@ -55,7 +56,7 @@ impl Turned {
         }
     }
 
-    /// Where cell (column, row) of `n` x `n` cells goes: the board's squares, or the cells of a marker.
+    /// New position of cell (column, row) of `nx` x `ny` cells: the squares of the board, or the cells of a marker.
     fn cell(&self, [i, j]: [usize; 2], [nx, ny]: [usize; 2]) -> [usize; 2] {
         match self.turn {
             Turn::None => [i, j],
@@ -69,7 +70,7 @@ impl Turned {
         cells.fold(0, |sum, [i, j]| sum | 1 << (j * bits + i))
     }
 
-    /// The board's codes as the turned board carries them, in the order of its markers.
+    /// The board's codes as they appear on the rotated board, in the order of its markers.
     ///
     /// # Errors
     /// An unknown dictionary, one with too few codes, or codes that the detector refuses.
@@ -83,7 +84,7 @@ impl Turned {
             return Ok(all);
         }
         let squares = self.squares.map(|n| n as usize);
-        // The turned board counts its markers row by row too.
+        // The rotated board also counts its markers row by row.
         let codes: BTreeMap<[usize; 2], u64> = places
             .iter()
             .map(|&(i, j, id)| {
@@ -100,7 +101,7 @@ impl Turned {
     }
 }
 
-/// The detector wants codes that live as long as the program: each list is stored once.
+/// The detector needs codes with static lifetime: each list is stored once.
 fn kept(codes: Vec<u64>) -> &'static [u64] {
     static LISTS: Mutex<Vec<&'static [u64]>> = Mutex::new(Vec::new());
     let mut lists = LISTS.lock().unwrap_or_else(PoisonError::into_inner);
@@ -136,12 +137,12 @@ mod tests {
             let codes = turned.dictionary(&board).unwrap();
             let bits = codes.marker_size();
             assert_eq!(codes.codes().len(), was.places().count());
-            // The k-th white square of a board that begins with black.
+            // The k-th white square of a board that starts with black.
             let [nx, ny] = turned.squares();
             let places = (0..ny).flat_map(|j| (0..nx).map(move |i| [i, j])).filter(|[i, j]| (i + j) % 2 == 1);
             for (k, [i, j]) in places.enumerate() {
                 for cell in 0..bits * bits {
-                    // The middle of a cell, in fractions of a square, is carried back and looked up in the print.
+                    // The middle of a cell, in fractions of a square, is mapped back and looked up in the print.
                     let at = |n: usize| 0.15 + 0.7 * (n as f64 + 1.5) / (bits + 2) as f64;
                     let (x, y) = (f64::from(i) + at(cell % bits), f64::from(j) + at(cell / bits));
                     let [c, r] = squares.map(f64::from);

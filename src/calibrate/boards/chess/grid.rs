@@ -1,6 +1,7 @@
-//! In: a picture. Out: labelled square lattices of chessboard corners, from several front ends that
-//! are tried in turn; labels start anywhere and run in any direction.
-//! Frame and unit: pixels. The only home of the crates `chess-corners` and `calib-targets-*` with `charuco`.
+//! In: a picture. Out: labelled square lattices of chessboard corners, from several front ends that are tried in
+//! turn. Labels start anywhere and run in any direction.
+//! Frame and unit: pixels. Only this file uses the crates `chess-corners`, `calib-targets-chessboard` and
+//! `calib-targets-core`.
 
 use crate::calibrate::boards::refine::{Corner, Grey, Window, corner};
 use crate::geometry::Vec2;
@@ -9,7 +10,7 @@ use calib_targets_core::{DetectorConfig, default_chess_config};
 use chess_corners::{ImageRefiner, UpscaleConfig};
 use rayon::prelude::*;
 
-/// A lattice: `at(i, j)` is the corner with label (i, j), where one was seen.
+/// A lattice: `at(i, j)` is the corner with label (i, j), if one was found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     pub columns: usize,
@@ -25,7 +26,7 @@ impl Grid {
     pub fn count(&self) -> usize {
         self.corners.iter().flatten().count()
     }
-    /// Steps to the next corners along i and j, by central differences where both neighbours are known.
+    /// Steps to the next corners along i and j, by central differences if both neighbours are known.
     pub fn steps(&self, i: isize, j: isize) -> Option<(Vec2, Vec2)> {
         let along = |di: isize, dj: isize| {
             let (before, here, after) = (self.at(i - di, j - dj), self.at(i, j), self.at(i + di, j + dj));
@@ -49,7 +50,7 @@ impl Grid {
         let (c, r) = (self.columns as isize, self.rows as isize);
         (0..r).flat_map(move |j| (0..c).map(move |i| (i, j)))
     }
-    /// The lattice turned by a quarter: new (i, j) = old (j, rows - 1 - i)... so that handedness stays.
+    /// The lattice rotated by a quarter turn: new (i, j) = old (j, rows - 1 - i). The handedness does not change.
     pub fn quarter_turn(&self) -> Grid {
         let (columns, rows) = (self.rows, self.columns);
         let corners = (0..rows)
@@ -58,7 +59,7 @@ impl Grid {
             .collect();
         Grid { columns, rows, corners }
     }
-    /// The lattice with `margin` unknown rows and columns on each side.
+    /// The lattice with `margin` unknown rows and columns added on each side.
     pub fn padded(&self, margin: usize) -> Grid {
         let (columns, rows) = (self.columns + 2 * margin, self.rows + 2 * margin);
         let mut corners = vec![None; columns * rows];
@@ -67,8 +68,7 @@ impl Grid {
         }
         Grid { columns, rows, corners }
     }
-    /// Columns and rows (first, one past the last) of the lattice without outer lines that hold fewer than half of
-    /// their corners.
+    /// Ranges of columns and of rows of the lattice without outer lines that hold fewer than half of their corners.
     pub fn extent(&self) -> [std::ops::Range<usize>; 2] {
         let known = |i: usize, j: usize| usize::from(self.corners[j * self.columns + i].is_some());
         let span = |n: usize, any: &dyn Fn(usize) -> bool| {
@@ -99,14 +99,14 @@ impl Grid {
             .collect();
         Grid { corners, ..*self }
     }
-    /// True where i, j run like x, y of the picture (seen from the front).
+    /// True if i, j have the handedness of x, y in the picture (seen from the front).
     pub fn right_handed(&self) -> bool {
         let sum: f64 =
             self.labels().filter_map(|(i, j)| self.steps(i, j)).map(|(u, v)| (u.x * v.y - u.y * v.x).signum()).sum();
         sum > 0.0
     }
-    /// Predicts unknown corners from their neighbours, at most a share `most` of all. False where more
-    /// are missing or one has no neighbours to be predicted from.
+    /// Predicts unknown corners from their neighbours. False if more than a share `most` of all is missing, or if one
+    /// cannot be predicted.
     pub fn fill_gaps(&mut self, most: f64) -> bool {
         let missing = self.corners.len() - self.count();
         if missing as f64 > most * self.corners.len() as f64 {
@@ -122,19 +122,19 @@ impl Grid {
         }
         true
     }
-    /// Where the neighbours put corner (i, j), known or not.
+    /// Position of corner (i, j) as its neighbours predict it, whether it is known or not.
     fn predict(&self, i: isize, j: isize) -> Option<Vec2> {
         let between = |di: isize, dj: isize| Some((self.at(i - di, j - dj)? + self.at(i + di, j + dj)?) / 2.0);
         let beyond = |di: isize, dj: isize| Some(self.at(i + di, j + dj)? * 2.0 - self.at(i + 2 * di, j + 2 * dj)?);
         let guesses = [between(1, 0), between(0, 1), beyond(1, 0), beyond(-1, 0), beyond(0, 1), beyond(0, -1)];
         guesses.into_iter().flatten().next()
     }
-    /// Index and place of every unknown corner that has neighbours to be predicted from.
+    /// Index and predicted position of every unknown corner with suitable neighbours.
     pub fn predicted(&self) -> Vec<(usize, Vec2)> {
         let unknown = self.labels().filter(|&(i, j)| self.at(i, j).is_none());
         unknown.filter_map(|(i, j)| Some((j as usize * self.columns + i as usize, self.predict(i, j)?))).collect()
     }
-    /// Each known corner refined on the picture; those where the fit fails become unknown.
+    /// Refines each known corner in the picture; those whose fit fails become `None`.
     pub fn refined(&self, grey: &Grey, window: &Window, band_px: f64) -> Vec<Option<Corner>> {
         let labels: Vec<(isize, isize)> = self.labels().collect();
         labels
@@ -147,7 +147,7 @@ impl Grid {
                     corner(grey, start, &u, &v, &Window { margin, longest_px, ..*window })
                 };
                 let first = with(&start, band_px, window.longest_px)?;
-                // A blurred edge is wider than the band and needs more of its length.
+                // A blurred edge is wider than the band, and its fit needs a longer part of the edge.
                 let (band, longest) = (3.5 * first.blur_px, 8.0 * first.blur_px);
                 if band <= band_px {
                     return Some(first);
@@ -158,14 +158,14 @@ impl Grid {
     }
 }
 
-/// One way to find corners, in the order of cost.
+/// A method to find corners, in the order of cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrontEnd {
-    /// ChESS on the picture as it is.
+    /// ChESS on the picture at its own size.
     Plain,
-    /// ChESS on the picture enlarged twice: squares below some 12 px.
+    /// ChESS on the picture enlarged twice, for squares below about 12 px.
     Enlarged,
-    /// Duda and Frese's Radon response: blur and low contrast.
+    /// Duda and Frese's Radon response, for blur and low contrast.
     Radon,
 }
 
@@ -211,19 +211,19 @@ pub fn lattices(candidates: &[ChessCorner], weakest: Option<f32>) -> Vec<Grid> {
     grids
 }
 
-/// An 8-bit picture whose used grey levels fill the range, and no larger than the detectors want:
-/// pixels, size, and the factor back to the full picture (centres at integers on both sides).
+/// An 8-bit picture for the detectors, reduced in size and with its grey levels stretched to the full range.
+/// `to_full` maps its points back to the full picture (pixel centres at integers in both).
 pub struct Prepared {
     pub width: usize,
     pub height: usize,
     pub levels: Vec<u8>,
     pub shrink: usize,
-    /// Grey levels between the 1st and 99th percentile as a share of full scale.
+    /// Range of grey levels between the 1st and 99th percentile as a share of full scale.
     pub span: f64,
 }
 
 impl Prepared {
-    /// Averages `shrink` x `shrink` pixels and stretches the contrast where it uses less than half of the range.
+    /// Averages `shrink` x `shrink` pixels, and stretches the contrast if it uses less than half of the range.
     pub fn new(image: &crate::raster::Image, grey: &Grey, shrink: usize) -> Prepared {
         let Grey { width, height, levels: small } = grey.shrunk(shrink);
         let full = f32::from(image.full_scale());
@@ -245,7 +245,7 @@ impl Prepared {
     pub fn view(&self) -> GrayImageView<'_> {
         GrayImageView { width: self.width, height: self.height, data: &self.levels }
     }
-    /// A point of the prepared picture in the full one.
+    /// Converts a point of the prepared picture to the full picture, px.
     pub fn to_full(&self, p: &Vec2) -> Vec2 {
         let s = self.shrink as f64;
         p.map(|c| (c + 0.5) * s - 0.5)
@@ -263,7 +263,7 @@ mod tests {
         let mut padded = grid.padded(2);
         assert_eq!((padded.columns, padded.rows, padded.count()), (8, 7, 12));
         assert_eq!(padded.extent(), [2..6, 2..5]);
-        // A speck of the background beside the board, and a corner that glare hides.
+        // A speck of the background beside the board, and a corner hidden by glare.
         padded.corners[8 * 3 + 6] = Some(Vec2::new(40.0, 9.0));
         padded.corners[8 * 2 + 2] = None;
         assert_eq!(padded.extent(), [2..6, 2..5]);

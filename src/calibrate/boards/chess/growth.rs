@@ -1,15 +1,15 @@
-//! In: a lattice of corners, some of them missing or wrong. Out: the corners that the picture shows to be of one board:
-//! wrong ones dropped, missing ones predicted from their neighbours and verified.
-//! Frame and unit: pixels; labels as the lattice has them.
+//! In: a lattice of corners, some of them missing or wrong. Out: the corners that belong to one board: wrong ones
+//! dropped, missing ones predicted from their neighbours and verified in the picture.
+//! Frame and unit: pixels; labels as in the lattice.
 
 use super::grid::Grid;
 use crate::calibrate::boards::refine::{Corner, Grey, Window};
 
-/// Refines what was found, then lets the lattice grow into corners that the detector missed, as long as the picture
-/// shows a crossing of the same contrast, polarity and blur there. The lattice follows.
+/// Refines the corners found, then extends the lattice to corners that the detector missed, as long as the picture
+/// shows a corner of the same contrast, polarity and blur there. The lattice is updated.
 pub fn grown(grid: &mut Grid, grey: &Grey, window: &Window, band_px: f64) -> Vec<Option<Corner>> {
     let mut corners = grid.refined(grey, window, band_px);
-    // A round grows by one row or column on each side.
+    // A round adds one row or column on each side.
     for _ in 0..grid.columns + grid.rows {
         let Some(typical) = Typical::of(&corners, grid.columns) else { break };
         for (k, c) in corners.iter_mut().enumerate() {
@@ -35,7 +35,7 @@ pub fn grown(grid: &mut Grid, grey: &Grey, window: &Window, band_px: f64) -> Vec
     corners
 }
 
-/// What this picture's corners look like, in the median.
+/// Median properties of this picture's corners.
 struct Typical {
     contrast: f64,
     blur: f64,

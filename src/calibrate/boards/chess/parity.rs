@@ -1,5 +1,5 @@
-//! In: chessboards of every size from 3x3 to 12x12, drawn, turned by quarters, mirrored and with their colours
-//! swapped. Out: tests that each is read from the origin that its description states, or refused.
+//! In: chessboards of every size from 3x3 to 12x12, drawn, rotated by quarter turns, mirrored and with swapped
+//! colours. Out: tests that each is read from the origin that its description states, or refused.
 //! Frame and unit: pixels, mm.
 
 use super::trials::{facing, picture_by};
@@ -20,7 +20,7 @@ fn opposite(colour: &str) -> &'static str {
     if colour == "black" { "white" } else { "black" }
 }
 
-/// The picture with pixel (x, y) moved to `to(x, y)`, its grey levels changed by `level`.
+/// The picture with pixel (x, y) moved to `to(x, y)` and its grey levels changed by `level`.
 fn changed(image: &Image, to: impl Fn(f64, f64) -> [f64; 2], level: impl Fn(u8) -> u8) -> Image {
     let old = image.to_f32();
     let mut pixels = vec![0; old.len()];
@@ -31,7 +31,7 @@ fn changed(image: &Image, to: impl Fn(f64, f64) -> [f64; 2], level: impl Fn(u8) 
     Image::from_u8(SIDE, SIDE, pixels)
 }
 
-/// Draws the board and reads it in all ways; the number of pictures read.
+/// Draws the board and reads it in all orientations; returns the number of pictures read.
 fn check(n: [u32; 2], drawn_first: &str) -> usize {
     let drawn = chessboard(n, drawn_first);
     let pixels_per_mm = 0.75 * f64::from(SIDE) / (f64::from(n[0].max(n[1])) * 10.0 + 34.0);
@@ -51,7 +51,7 @@ fn check(n: [u32; 2], drawn_first: &str) -> usize {
     let picture = picture_by(&camera, &drawn, &pose);
     let last = f64::from(SIDE - 1);
     let mut count = 0;
-    // Colours as drawn, and a negative of the picture: a print of white on black, before a bright wall.
+    // Colours as drawn, and a negative of the picture: a print of white on black, in front of a bright wall.
     for (negative, quarter) in (0..8).map(|k| (k % 2 == 1, k / 2)) {
         let turn = |x: f64, y: f64| [[x, y], [last - y, x], [last - x, last - y], [y, last - x]][quarter];
         let level = |v: u8| if negative { 255 - v } else { v };
@@ -72,7 +72,7 @@ fn check(n: [u32; 2], drawn_first: &str) -> usize {
         let best = ways.iter().map(|t| off(&t.ids)).fold(f64::INFINITY, f64::min);
         assert!(view.points.len() == features.len() && best < 0.1, "{said}: {best} px");
         count += 1;
-        // The other colour: another turn of the same board where one swaps the colours, no board otherwise.
+        // The other colour: the same board in another rotation if that swaps the colours, otherwise no board.
         let other = chessboard(n, opposite(first));
         let swaps = (n[0] + n[1]) % 2 == 1 || (n[0] == n[1] && n[0] % 2 == 1);
         if quarter == 0 {
@@ -86,7 +86,7 @@ fn check(n: [u32; 2], drawn_first: &str) -> usize {
                 }
                 Err(e) => assert!(!swaps && e.what.contains("first corner"), "{said}: {e}"),
             }
-            // A mirrored chessboard is another board only where both numbers are odd and differ.
+            // A mirrored chessboard is another board only if both numbers are odd and differ.
             let mirrored = changed(&shown, |x, y| [last - x, y], |v| v);
             let told = n[0] % 2 == 1 && n[1] % 2 == 1 && n[0] != n[1];
             match find(&mirrored, &board, &FindOptions::default()) {
@@ -102,7 +102,7 @@ fn check(n: [u32; 2], drawn_first: &str) -> usize {
 fn every_parity_is_read_from_its_origin_in_every_orientation() {
     let long = std::env::var_os("SHEETLIGHT_LONG").is_some();
     let all = (3..=12).flat_map(|a| (3..=12).map(move |b| [a, b]));
-    // Short: all that is square, and each parity of rectangles lying and upright.
+    // Short version: all squares, and rectangles of each parity in both orientations.
     let some = [[3, 4], [4, 6], [5, 3], [6, 5], [7, 9], [8, 7], [8, 4], [9, 6]];
     let boards = all.filter(|n| long || n[0] == n[1] || some.contains(n));
     let (mut boards_read, mut pictures) = (0, 0);

@@ -1,5 +1,5 @@
-//! In: boards drawn by `print` and seen by a perfect pinhole. Out: tests that each kind is found where
-//! it is, and refused with the right reason where it is not.
+//! In: boards drawn by `print` and seen by a perfect pinhole camera. Out: tests that each kind is found at its true
+//! position, and otherwise refused with the right reason.
 //! Frame and unit: pixels, mm.
 
 use super::turns::turns;
@@ -33,7 +33,7 @@ pub(in crate::calibrate) fn facing(board: &BoardSpec, rotation: Vec3, distance: 
     Rigid::new(r, Vec3::new(3.0, -2.0, distance) - r * centre)
 }
 
-/// Brightness of the print at a point of the sheet: rows of rectangles are few, a raster is not needed.
+/// Brightness of the print at a point of the sheet, stored as cells of `CELL` mm.
 struct Print {
     cells: Vec<bool>,
     columns: usize,
@@ -77,7 +77,7 @@ fn picture(board: &BoardSpec, pose: &Rigid<Camera, Board>) -> Image {
     picture_by(&camera(), board, pose)
 }
 
-/// 36 rays a pixel.
+/// Renders the board with 36 rays per pixel.
 pub(in crate::calibrate) fn picture_by(k: &Intrinsics, board: &BoardSpec, pose: &Rigid<Camera, Board>) -> Image {
     let print = Print::new(board, &sheet(board).unwrap());
     let back = pose.inverse();
@@ -87,7 +87,7 @@ pub(in crate::calibrate) fn picture_by(k: &Intrinsics, board: &BoardSpec, pose: 
         for u in 0..k.width {
             let mut sum = 0.0;
             for s in 0..36 {
-                // A rank-1 lattice: 36 different columns and rows, so that aligned edges are not quantised.
+                // A rank-1 lattice: 36 different columns and rows, so that axis-parallel edges are not quantised.
                 let (dx, dy) = ((f64::from(s) + 0.5) / 36.0, (f64::from(s * 11 % 36) + 0.5) / 36.0);
                 let px = Vec2::new(f64::from(u) + dx - 0.5, f64::from(v) + dy - 0.5);
                 let n = k.normalised(&px);
@@ -100,7 +100,7 @@ pub(in crate::calibrate) fn picture_by(k: &Intrinsics, board: &BoardSpec, pose: 
     Image::from_u8(k.width, k.height, pixels)
 }
 
-/// Largest distance of the features from where they are, with the best of the board's turns.
+/// Largest distance of the features from their true pixels, with the best of the board's rotations.
 fn worst(board: &BoardSpec, pose: &Rigid<Camera, Board>, view: &BoardView) -> f64 {
     let features = board.features();
     let error = |view: &BoardView| {
@@ -129,7 +129,7 @@ fn charuco() -> BoardSpec {
     }
 }
 
-/// The same with a white square at the origin (`None`: the description leaves it open) and another first id.
+/// A ChArUco board with a stated colour of the first square (`None`: not stated) and another first id.
 fn begins(squares: [u32; 2], colour: Option<&str>, first_id: u32) -> BoardSpec {
     BoardSpec::Charuco {
         squares,
@@ -162,8 +162,8 @@ fn every_kind_is_found_where_it_is_from_every_side() {
     }
 }
 
-/// Boards as OpenCV drew them before 4.6, with a first id, and as it draws them now, with descriptions that leave the
-/// first square open.
+/// Boards as OpenCV drew them before 4.6, with a first id, and as it draws them now. The descriptions do not state
+/// the first square.
 #[test]
 fn the_first_square_is_found_out_from_the_ids() {
     for (squares, printed, first_id) in
@@ -181,12 +181,12 @@ fn the_first_square_is_found_out_from_the_ids() {
             );
             assert!(view.points.len() * 10 >= board.features().len() * 9);
         }
-        // Odd columns and even rows: read the other way the board is the same print, shifted by a column.
+        // Odd columns and even rows: with the other colour the same print reads shifted by a column.
         let other = begins(squares, Some(if printed == "white" { "black" } else { "white" }), first_id);
         let read = find(&image, &other, &FindOptions::default());
         assert_eq!(read.is_ok(), squares == [7, 6], "{squares:?} {printed}: found as {other:?}");
     }
-    // Its last column of corners is out of view: nothing tells.
+    // Its last column of corners is out of view: nothing distinguishes the two orders.
     let board = begins([7, 6], Some("white"), 0);
     let mut pose = facing(&board, Vec3::zeros(), 120.0);
     pose.translation.x += 30.0;
@@ -199,7 +199,7 @@ fn the_first_square_is_found_out_from_the_ids() {
     assert!(find(&image, &odd, &FindOptions::default()).unwrap_err().what.contains("7x5"));
 }
 
-/// Markers whose cells are a whole number of the print's cells.
+/// Markers whose cells are an integer number of the print's cells.
 fn markers(count: [u32; 2], dictionary: &str, first_id: u32) -> BoardSpec {
     let bits = calib_targets_aruco::resolve_dictionary(dictionary).unwrap().marker_size();
     let marker_mm = 2.0 * (bits + 2) as f64;
@@ -231,7 +231,8 @@ fn markers_of_every_dictionary_are_read_where_they_are_from_every_side() {
             let off = worst(&board, &pose, &view);
             worst_of_all = worst_of_all.max(off);
             assert!(off < 0.1, "{board:?}: {off} px");
-            // Other ids of the same dictionary, and the same ids of another, are not this board.
+            // Other ids of the same dictionary are not this board, and neither are the same ids of another
+            // dictionary.
             let other = find(&image, &markers(count, dictionary, 30), &FindOptions::default()).unwrap_err();
             assert!(other.cause.contains("other ids"), "{other}");
             let levels = image.to_f32();
@@ -242,7 +243,7 @@ fn markers_of_every_dictionary_are_read_where_they_are_from_every_side() {
     println!("corners of markers off by {worst_of_all:.3} px at most");
 }
 
-/// Every id is read in a clean view: codes differ in what they do to the patch that is searched for.
+/// Every id is read in a clean view: each code changes the shape of the patch that is searched for.
 #[test]
 fn no_id_of_any_dictionary_is_unreadable() {
     let dictionaries = ["DICT_4X4_1000", "DICT_5X5_1000", "DICT_6X6_1000", "DICT_7X7_1000", "DICT_APRILTAG_36h11"];
@@ -282,7 +283,7 @@ fn markers_that_are_covered_are_left_out() {
         let rng = &mut rand_pcg::Pcg64::seed_from_u64(seed);
         let mut levels: Vec<u8> =
             drawn.iter().map(|v| (v + noise.sample(rng)).round().clamp(0.0, 255.0) as u8).collect();
-        // A grey card over the middle: it touches six of the twenty.
+        // A grey card over the middle; it touches six of the twenty markers.
         for y in 210..260 {
             levels[y * WIDTH as usize + 290..y * WIDTH as usize + 340].fill(120);
         }
@@ -329,7 +330,7 @@ fn boards_that_look_alike_when_turned_say_so() {
 
 #[test]
 fn a_circles_centre_is_not_the_centre_of_its_ellipse() {
-    // Large dots near a tilted camera: uncorrected, the centres would be 0.1 px and more off.
+    // Large dots close to a tilted camera: without correction, the centres would be off by 0.1 px and more.
     let board =
         BoardSpec::Circles { dots: [4, 3], pitch_mm: 30.0, diameter_mm: Some(22.0), asymmetric: false, border_mm: 9.0 };
     let pose = facing(&board, Vec3::new(0.0, 0.6, 0.1), 190.0);
@@ -368,7 +369,7 @@ fn what_is_not_found_is_explained() {
     assert!(why(&whole, &circles(7, 5, false)).contains("no grid of 7x5 dots"));
 }
 
-/// Blurred by three box filters of the given half width: nearly a Gaussian of that many px.
+/// Blurred by three box filters of the given half width: nearly a Gaussian whose sigma is that many px.
 fn out_of_focus(image: &Image, half: i64) -> Image {
     let (w, h) = (i64::from(WIDTH), i64::from(HEIGHT));
     let mut levels = image.to_f32();

@@ -1,21 +1,21 @@
-//! In: a board's description. Out: the turns after which it looks the same; which of them a picture shows is
-//! told by the whole set (`hand_eye_turns`), never by the picture.
+//! In: a board's description. Out: the rotations after which it looks the same. Which of them applies to a picture is
+//! resolved by the entire set (`hand_eye::turns`), never by the picture.
 //! Frame and unit: board frame, mm.
 
 use crate::calibrate::boards::BoardView;
 use crate::geometry::{Board, Rigid, Vec2, Vec3, exp};
 use crate::recording::BoardSpec;
 
-/// A turn after which the board looks the same.
+/// A rotation after which the board looks the same.
 #[derive(Clone, Debug)]
 pub struct Turn {
-    /// Maps a feature's place to the place it takes.
+    /// Maps the position of a feature to the position that it moves to.
     pub turn: Rigid<Board, Board>,
-    /// `ids[i]` is the feature that takes the place of feature i.
+    /// `ids[i]` is the feature at the new position of feature i.
     pub ids: Vec<usize>,
 }
 
-/// All such turns, the identity first. One entry: every picture tells the origin by itself.
+/// All such rotations, the identity first. With one entry, every single picture determines the origin.
 pub fn turns(board: &BoardSpec) -> Vec<Turn> {
     let features = board.features();
     let (mut low, mut high) = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
@@ -37,7 +37,7 @@ pub fn turns(board: &BoardSpec) -> Vec<Turn> {
 fn colours_agree(board: &BoardSpec, quarter: u32) -> bool {
     match board {
         BoardSpec::Chessboard { inner_corners: [nx, ny], .. } => {
-            // An odd number of inner corners is an even number of squares: a quarter turn swaps their colours.
+            // An odd number of inner corners means an even number of squares: a quarter turn swaps their colours.
             (nx + ny) % 2 == 0 && (quarter == 2 || (nx == ny && nx % 2 == 0))
         }
         BoardSpec::Charuco { .. } | BoardSpec::MarkerGrid { .. } => false,
@@ -46,7 +46,7 @@ fn colours_agree(board: &BoardSpec, quarter: u32) -> bool {
 }
 
 impl BoardView {
-    /// The same view read with another of the board's turns.
+    /// The same view read with another of the board's rotations.
     pub fn turned(&self, turn: &Turn) -> BoardView {
         let mut points = self.points.clone();
         points.iter_mut().for_each(|p| p.feature_id = turn.ids[p.feature_id]);

@@ -1,5 +1,5 @@
-//! In: boards of 11x8 inner corners, whole and in view, under tilts, distances, light, blur and noise drawn at random.
-//! Out: the test that every one of them is found where it is.
+//! In: boards of 11x8 inner corners, completely in view, with random tilts, distances, light, blur and noise. Out:
+//! the test that every one of them is found at its true position.
 //! Frame and unit: pixels, mm.
 
 use super::trials::{facing, picture_by};
@@ -16,8 +16,9 @@ use std::f64::consts::{PI, TAU};
 const WIDTH: usize = 640;
 const HEIGHT: usize = 480;
 
-/// Smallest squares: a corner's fit has four quarters of a square to look at. A marker's cell must stand out of the
-/// blur: of cells narrower than twice its sigma every other one keeps less than a third of its contrast.
+/// Smallest squares and cells in the test. A corner's fit uses four quarters of a square. A marker's cell must be
+/// visible despite the blur: of cells narrower than twice its sigma, every other one keeps less than a third of its
+/// contrast.
 const LEAST_SQUARE_PX: f64 = 9.0;
 const LEAST_CELL_PX: f64 = 2.2;
 const LEAST_CELL_BLURS: f64 = 2.0;
@@ -28,7 +29,7 @@ fn camera() -> Intrinsics {
     Intrinsics { fx: 600.0, fy: 600.0, cx: 319.5, cy: 239.5, skew: 0.0, distortion, width, height }
 }
 
-/// A pose with the whole board in view, and its smallest step from corner to corner, px.
+/// A pose with the entire board in view, and its smallest step between corners, px.
 fn pose(board: &BoardSpec, rng: &mut Pcg64) -> (Rigid<Camera, Board>, f64) {
     let [x0, y0, x1, y1] = board.outline();
     let seen = |pose: &Rigid<Camera, Board>, x: f64, y: f64| {
@@ -54,7 +55,7 @@ fn pose(board: &BoardSpec, rng: &mut Pcg64) -> (Rigid<Camera, Board>, f64) {
     }
 }
 
-/// The picture under light from a side, out of focus by `blur` px, with noise.
+/// The picture with light from one side, defocused by `blur` px, with noise.
 fn seen_in(drawn: &Image, blur: f64, rng: &mut Pcg64) -> Image {
     let (black, white) = (rng.random_range(8.0..50.0f64), rng.random_range(90.0..235.0f64));
     let slope = [rng.random_range(-0.8..0.8), rng.random_range(-0.8..0.8)];
@@ -109,7 +110,7 @@ fn every_board_that_is_whole_and_in_view_is_found() {
         let charuco = matches!(board, BoardSpec::Charuco { .. });
         let blur = rng.random_range(0.2..1.6);
         let least = if charuco { LEAST_CELL_PX.max(LEAST_CELL_BLURS * blur) * 10.0 } else { LEAST_SQUARE_PX };
-        // Of chessboards small ones: large ones are easy.
+        // Only small chessboards: large ones are easy.
         let wanted = least..if charuco { f64::INFINITY } else { 16.0 };
         let (pose, step) =
             std::iter::repeat_with(|| pose(&board, rng)).find(|(_, step)| wanted.contains(step)).expect("endless");
@@ -126,7 +127,7 @@ fn every_board_that_is_whole_and_in_view_is_found() {
             .points
             .iter()
             .map(|p| (camera().pixel_from_point(&pose.point(&features[p.feature_id])).unwrap() - p.pixel).norm());
-        // Blurred squares of 9 px under noise of 5 levels: a corner is known to 0.4 px.
+        // Blurred squares of 9 px under noise of 5 levels: a corner's sigma is 0.4 px.
         let off = far.fold(0.0, f64::max);
         if off > 2.0 || view.points.len() < 80 {
             missed.push(format!("{seed} (squares of {step:.1} px): {} corners, {off:.2} px off", view.points.len()));

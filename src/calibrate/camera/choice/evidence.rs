@@ -1,5 +1,5 @@
-//! In: a camera solved with every term. Out: the terms that the pictures give reason for; the others held at zero.
-//! Frame and unit: the lens's own.
+//! In: a camera solved with all terms. Out: the terms that the pictures support; the others are held at zero.
+//! Frame and unit: those of the lens.
 
 use crate::calibrate::camera::bundle::State;
 use crate::calibrate::camera::fit::Fit;
@@ -8,8 +8,8 @@ use crate::solve::Solution;
 use nalgebra::DMatrix;
 use nalgebra::DVector;
 
-/// Holds lens terms at zero, from the highest down, where the pictures cannot tell them from zero and
-/// where estimating them would cost accuracy (expected ray error over the image).
+/// Holds lens terms at zero, from the highest down, if the pictures cannot distinguish them from zero and if
+/// estimating them would cost accuracy (expected ray error over the image).
 pub(in crate::calibrate::camera) fn by_evidence(fit: &Fit<'_>, solution: &mut Solution<State>, held: &mut Vec<usize>) {
     for block in [&[8][..], &[6, 7], &[5], &[4]] {
         if block.iter().all(|i| held.contains(i)) {
@@ -32,7 +32,7 @@ pub(in crate::calibrate::camera) fn by_evidence(fit: &Fit<'_>, solution: &mut So
     }
 }
 
-/// Squared Mahalanobis distance of some parameters from zero; 0 where they are not determined.
+/// Squared Mahalanobis distance of some parameters from zero; 0 if they are not determined.
 fn tells(fit: &Fit<'_>, solution: &Solution<State>, block: &[usize]) -> f64 {
     let Some(c) = fit.covariance(solution) else { return 0.0 };
     let theta = DVector::from_iterator(block.len(), block.iter().map(|&i| solution.state.camera[i]));

@@ -1,6 +1,6 @@
 //! In: a camera solved with the plain lens (k1 k2 p1 p2 k3). Out: the same with one more family of terms (the
-//! sensor's tilt, thin prism, rational) where pictures that it was not solved from give reason for it.
-//! Frame and unit: the lens's own; px. docs/math.md, Camera calibration (10), (11).
+//! sensor's tilt, thin prism, rational) if held-out pictures support it.
+//! Frame and unit: those of the lens; px. docs/math.md, Camera calibration (10), (11).
 
 use super::held_out::{WORTH, gain, held_out};
 use crate::calibrate::camera::bundle::State;
@@ -10,10 +10,10 @@ use crate::calibrate::camera::ray_error::{expected_ray_error, following, rays_ap
 use crate::camera::{Intrinsics, ParameterMatrix, Parameters, SKEW};
 use crate::solve::Solution;
 
-/// What a lens may have beside the plain terms, one at a time: together they are hardly told apart, and a person may
-/// ask for them.
+/// Families of terms beyond the plain lens, added one at a time: together they can hardly be separated. The user may
+/// request any of them.
 const FAMILIES: [Lens; 3] = [Lens::Scheimpflug, Lens::Prism, Lens::Rational];
-/// Fewer pictures say nothing of one another.
+/// Fewer pictures cannot be held out against each other.
 const MIN_PICTURES: usize = 8;
 /// Error of features that all pictures share, rms px: print, blur and light move them alike, and pictures that are held
 /// out do not show it. Between 0.013 and 0.027 px of three cameras' photographs were explained by terms that moved the
@@ -22,7 +22,7 @@ const SHARED_PX: f64 = 0.02;
 /// Probability of a family that fits better by less than [`SHARED_PX`].
 const ODDS: f64 = 0.25;
 
-/// A family of lens terms that pictures ask for and that is not believed.
+/// A family of lens terms that fits better and is not adopted.
 #[derive(Clone, Debug)]
 pub struct Doubt {
     /// The family.
@@ -36,8 +36,8 @@ pub struct Doubt {
 }
 
 impl Doubt {
-    /// What not knowing whether the family is there adds to the covariance of a camera without it. The camera's own
-    /// parameters move as they have to for the viewing rays to follow.
+    /// Covariance that the doubt about the family adds to a camera without it. The camera's own parameters move so that
+    /// its viewing rays follow those of the family.
     pub(in crate::calibrate::camera) fn covariance(
         &self,
         k: &Intrinsics,
@@ -48,8 +48,8 @@ impl Doubt {
     }
 }
 
-/// Takes the family in that explains the most, if one does. Else returns the families that would be taken in if
-/// features had no errors in common.
+/// Adds the family with the largest gain. If none is adopted, returns those that would be adopted if features had no
+/// errors in common.
 pub(in crate::calibrate::camera) fn by_families(
     fit: &Fit<'_>,
     solution: &mut Solution<State>,
@@ -65,7 +65,7 @@ pub(in crate::calibrate::camera) fn by_families(
     for family in FAMILIES {
         let with: Vec<usize> = family.held().into_iter().chain(skew.then_some(SKEW)).collect();
         let Some(more) = fit.fine(&with, without(&solution.state, &with)).so_far() else { continue };
-        // Only what fits its own pictures better can fit others better.
+        // Only a model that fits its own pictures better can fit others better.
         if !(more.sigma0.powi(2) < (1.0 - WORTH) * solution.sigma0.powi(2)) || !worth_its_noise(fit, solution, &more) {
             continue;
         }
@@ -100,7 +100,7 @@ fn without(state: &State, held: &[usize]) -> State {
     state
 }
 
-/// True where the rays move by more than the further terms' own uncertainty adds to them.
+/// True if the change of the rays exceeds the uncertainty that the additional terms add to them.
 fn worth_its_noise(fit: &Fit<'_>, plain: &Solution<State>, more: &Solution<State>) -> bool {
     let error = |s| fit.covariance(s).map(|c| expected_ray_error(&fit.camera(s), &c).powi(2));
     let (Some(less), Some(noise)) = (error(plain), error(more)) else { return false };

@@ -1,25 +1,24 @@
-//! In: two models of a camera and its boards. Out: whether pictures that neither was solved from fit better with the
-//! second.
+//! In: two models of a camera and its boards. Out: whether held-out pictures fit better with the second.
 //! Frame and unit: squares of the corners' sigmas. docs/math.md, Camera calibration (10).
 
 use crate::calibrate::camera::bundle::{Corner, State};
 use crate::calibrate::camera::fit::Fit;
 use crate::solve::Solution;
 
-/// Parts in which pictures are held out.
+/// Number of parts in which pictures are held out.
 const PARTS: usize = 4;
-/// Standard errors by which the held-out pictures must fit better.
+/// The held-out pictures must fit better by this many standard errors.
 const SURE: f64 = 3.0;
-/// The same of what does no harm where it is taken in without need.
+/// The same for a model that does no harm if it is added without need.
 const LIKELY: f64 = 2.0;
-/// Least share of the squared residuals that goes: what is less is the corners', whatever its odds. Of photographs by
-/// a plain lens rational terms explain between 0.5 and 2 %, three standard errors sure.
+/// Smallest decrease of the squared residuals, as a share. A smaller decrease, however significant, is attributed to
+/// the corners. In photographs taken with a plain lens, rational terms explain 0.5 to 2 % at three standard errors.
 pub(super) const WORTH: f64 = 0.02;
-/// Residuals beyond this many sigmas say no more.
+/// Residuals are cut off at this many sigmas.
 const FAR: f64 = 3.0;
 
-/// Mean squared residual of each picture, in squares of the corners' sigmas, with the camera and the shape of others
-/// and its own pose. `sigma0` is the plainest model's: all are cut off alike.
+/// Mean squared residual of each picture, in squares of the corners' sigmas, with the camera and shape solved from
+/// other pictures and its own pose. `sigma0` is the plainest model's, so that all models have the same cut-off.
 pub(super) fn held_out(fit: &Fit<'_>, solution: &Solution<State>, held: &[usize], sigma0: f64) -> Vec<f64> {
     let far = (FAR * sigma0).powi(2);
     let mut scores = vec![0.0; fit.corners.len()];
@@ -44,7 +43,8 @@ pub(super) fn held_out(fit: &Fit<'_>, solution: &Solution<State>, held: &[usize]
     scores
 }
 
-/// Share by which the second scores are lower; `None` where picture against picture that is not sure or not worth it.
+/// Share by which the second scores are lower; `None` if, compared picture by picture, the decrease is not
+/// significant or too small.
 pub(super) fn gain(plain: &[f64], more: &[f64]) -> Option<f64> {
     let n = plain.len() as f64;
     let lower: Vec<f64> = plain.iter().zip(more).map(|(a, b)| a - b).collect();
@@ -54,7 +54,7 @@ pub(super) fn gain(plain: &[f64], more: &[f64]) -> Option<f64> {
     (mean > SURE * error && mean > WORTH * all).then(|| mean / all)
 }
 
-/// True where the second scores are lower picture against picture, by factors.
+/// True if the second scores are significantly lower, compared picture by picture as ratios.
 pub(super) fn surely_lower(plain: &[f64], more: &[f64]) -> bool {
     let n = plain.len() as f64;
     let factors: Vec<f64> = plain.iter().zip(more).map(|(a, b)| (a / b).ln()).collect();

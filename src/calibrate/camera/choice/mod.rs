@@ -1,6 +1,6 @@
-//! In: a camera solved with the plain lens from a board as drawn. Out: the same with what the pictures give reason
-//! for: the board's shape, further terms of the lens; without the terms that they do not tell from zero.
-//! Frame and unit: the lens's own; px, mm.
+//! In: a camera solved with the plain lens from a board as drawn. Out: the same with the additions that the pictures
+//! support (the board's shape, further lens terms) and without the terms that they cannot distinguish from zero.
+//! Frame and unit: those of the lens; px, mm.
 
 mod evidence;
 mod families;

@@ -1,5 +1,5 @@
-//! In: a camera solved from a board as drawn. Out: the same with the board's shape beside it, where pictures that
-//! neither was solved from give reason for it.
+//! In: a camera solved from a board as drawn. Out: the same with the board's shape estimated too, if held-out
+//! pictures support it.
 //! Frame and unit: board frame, mm; px. docs/math.md, Camera calibration (12), (13).
 
 use super::held_out::{WORTH, held_out, surely_lower};
@@ -9,18 +9,20 @@ use crate::calibrate::camera::fit::Fit;
 use crate::camera::PARAMETERS;
 use crate::solve::Solution;
 
-/// Fewer pictures say little of one another, and of six the camera is off by up to 1.7 of what is stated.
+/// Fewer pictures can hardly be held out against each other; with six, the camera's error is up to 1.7 times the
+/// stated one.
 const MIN_PICTURES: usize = 8;
-/// Usual size of a coefficient before the pictures tell it, over half of the board's length: more than print and
-/// plate ever are off.
+/// Usual size of a coefficient before the pictures determine it, as a share of half of the board's length. It exceeds
+/// any real deviation of print and plate.
 const FIRST: f64 = 0.01;
-/// Least of it: below, a coefficient is held for all that matters.
+/// Lower limit of this share, below which a coefficient is effectively held at zero.
 const LEAST: f64 = 1e-7;
-/// Rounds at most in which sizes and coefficients settle, and by what factor they may move then.
+/// Largest number of rounds in which sizes and coefficients settle, and the factor by which settled sizes may still
+/// change.
 const ROUNDS: usize = 8;
 const SETTLED: f64 = 1.1;
 
-/// Takes the board's shape in, if the pictures tell it.
+/// Adds the board's shape if the pictures support it.
 pub(in crate::calibrate::camera) fn by_shape(
     fit: &mut Fit<'_>,
     basis: Basis,
@@ -32,7 +34,7 @@ pub(in crate::calibrate::camera) fn by_shape(
     }
     let (mut bent, start) = bending(fit, basis, solution);
     let Some(first) = bent.rough(held, start) else { return };
-    // As many residuals as coefficients go by chance.
+    // By chance, as many squared residuals vanish as there are coefficients.
     let left = first.sigma0.powi(2) * first.freedom / (first.freedom - Basis::LEN as f64).max(1e-9);
     if !(left < (1.0 - WORTH) * solution.sigma0.powi(2)) {
         return;
@@ -44,7 +46,7 @@ pub(in crate::calibrate::camera) fn by_shape(
     }
 }
 
-/// Takes the board's shape in, whatever the pictures tell; not where they do not determine it.
+/// Adds the board's shape regardless of the pictures' support, unless they do not determine it.
 pub(in crate::calibrate::camera) fn shaped(
     fit: &mut Fit<'_>,
     basis: Basis,
@@ -58,13 +60,13 @@ pub(in crate::calibrate::camera) fn shaped(
     }
 }
 
-/// The same with a board whose shape is unknown.
+/// The same fit with a board of unknown shape.
 fn bending<'a>(fit: &Fit<'a>, basis: Basis, solution: &Solution<State>) -> (Fit<'a>, State) {
     let bent = Fit { bent: Some(Bent { basis, usual: [FIRST * basis.size(); 2] }), ..*fit };
     (bent, State { shape: vec![0.0; Basis::LEN], ..solution.state.clone() })
 }
 
-/// The optimum once more, with the sizes of the coefficients as another lens leaves them.
+/// Repeats the optimum with the sizes of the coefficients adapted to another lens.
 pub(in crate::calibrate::camera) fn resized(fit: &mut Fit<'_>, solution: &mut Solution<State>, held: &[usize]) {
     if fit.bent.is_some()
         && let Some(again) = settled(fit, solution.clone(), held)
@@ -73,8 +75,8 @@ pub(in crate::calibrate::camera) fn resized(fit: &mut Fit<'_>, solution: &mut So
     }
 }
 
-/// Sizes that follow from the coefficients and coefficients that follow from the sizes, by turns \[mackay92\]. `None`
-/// where the pictures do not determine the camera.
+/// Alternates between the sizes given the coefficients and the coefficients given the sizes \[mackay92\]. `None` if
+/// the pictures do not determine the camera.
 fn settled(fit: &mut Fit<'_>, mut solution: Solution<State>, held: &[usize]) -> Option<Solution<State>> {
     for _ in 0..ROUNDS {
         let bent = fit.bent.as_mut()?;
@@ -89,8 +91,8 @@ fn settled(fit: &mut Fit<'_>, mut solution: Solution<State>, held: &[usize]) -> 
     fit.fine(held, solution.state).so_far()
 }
 
-/// Usual size of the coefficients in the plane and out of it: their squares over the number of them that the pictures
-/// determine.
+/// Usual size of the coefficients in the plane and out of it: their squares divided by the number of coefficients
+/// that the pictures determine.
 fn sizes(bent: &Bent, solution: &Solution<State>) -> Option<[f64; 2]> {
     let covariance = solution.covariance.as_ref()?;
     let of = |lifts: bool| {

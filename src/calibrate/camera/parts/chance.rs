@@ -1,4 +1,4 @@
-//! How likely chance alone explains a gain.
+//! Probability that a gain is explained by chance alone.
 
 /// Logarithm of the probability that `numbers` useless parameters lower a sum of squares by `gain`, in units of a
 /// variance that was estimated from `freedom` squares. It is the tail of Fisher's F distribution. An odd count is
@@ -19,8 +19,8 @@ fn ln_ways(n: usize, k: usize) -> f64 {
     (0..k).map(|i| ((n - i) as f64 / (i + 1) as f64).ln()).sum()
 }
 
-/// Logarithm of the number of sets as likely as this one beforehand: half of the belief is for pictures that were taken
-/// one after the other, half for any; each number of pictures up to half of them counts alike.
+/// Logarithm of the prior number of sets that are as likely as this one. Half of the prior is for pictures taken
+/// consecutively, half for any selection. All sizes up to half of the pictures are equally likely.
 pub fn ln_sets(other: &[bool]) -> f64 {
     let n = other.len();
     let k = other.iter().filter(|o| **o).count();

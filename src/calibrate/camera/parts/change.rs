@@ -1,33 +1,33 @@
-//! In which ways the camera of some pictures may differ from that of the others, and how that is said. Focal lengths
-//! are shares, places px.
+//! Ways in which the camera of some pictures may differ from that of the others, and their wording. Focal lengths are
+//! relative; positions are in px.
 
 use crate::camera::{Flip, Intrinsics, PARAMETERS, Parameters};
 use nalgebra::{DMatrix, DVector};
 
-/// How some pictures were read out or taken against the others.
+/// Difference in readout or camera between some pictures and the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Alike.
+    /// No difference.
     Same,
     Flip(Flip),
     /// Another focal length.
     Focus,
     /// Another region of the sensor.
     Region,
-    /// Both.
+    /// Another focal length and another region.
     Camera,
 }
 
-/// The kinds whose numbers are chosen; flips have none.
+/// The kinds with free parameters; flips have none.
 pub const FREE: [Kind; 3] = [Kind::Focus, Kind::Region, Kind::Camera];
 
-/// Smaller changes are not reported. A lens that warms up moves by as much, and so does what the lens model leaves out
-/// between near and far boards.
+/// Smaller changes are not reported. A warming lens moves by as much, and so does the error of the lens model between
+/// near and distant boards.
 const LEAST_PX: f64 = 1.5;
 const LEAST_FOCUS: f64 = 0.003;
 
 impl Kind {
-    /// How the numbers of this kind move the camera's parameters: one column a number.
+    /// Derivatives of the camera's parameters by the parameters of this kind: one column each.
     pub fn directions(self, k: &Intrinsics) -> DMatrix<f64> {
         let mut focus = Parameters::zeros();
         (focus[0], focus[1]) = (k.fx, k.fy);
@@ -41,12 +41,12 @@ impl Kind {
         DMatrix::from_fn(PARAMETERS, columns.len(), |row, c| columns[c][row])
     }
 
-    /// The kind by whose parameters the scatter is measured: a flip has none and takes those of a region.
+    /// The kind whose parameters are used to measure the scatter: a flip has none and uses those of a region.
     pub fn compared(self) -> Kind {
         if matches!(self, Kind::Flip(_)) { Kind::Region } else { self }
     }
 
-    /// The camera of these pictures, from the others'.
+    /// The camera of these pictures, computed from the camera of the others.
     pub fn camera(self, first: &Intrinsics, change: &DVector<f64>) -> Intrinsics {
         match self {
             Kind::Flip(flip) => first.flipped(flip),
@@ -57,7 +57,7 @@ impl Kind {
         }
     }
 
-    /// Signs with which the first camera's parameters move the second's.
+    /// Signs of the derivatives of the second camera's parameters by those of the first.
     pub fn signs(self, first: &Intrinsics) -> Parameters {
         let Kind::Flip(flip) = self else { return Parameters::repeat(1.0) };
         let one = first.with_parameters(&Parameters::repeat(1.0)).flipped(flip).parameters();
@@ -74,13 +74,13 @@ impl Kind {
         }
     }
 
-    /// Whether it is large enough to be said.
+    /// Whether the change is large enough to be reported.
     pub fn is_visible(self, change: &DVector<f64>) -> bool {
         let (focus, [x, y]) = self.focus_and_region(change);
         matches!(self, Kind::Flip(_)) || focus.abs() > LEAST_FOCUS || x.hypot(y) > LEAST_PX
     }
 
-    /// The pictures are ...
+    /// Completes the sentence "The pictures are ...".
     pub fn words(self, change: &DVector<f64>) -> String {
         let (focus, [x, y]) = self.focus_and_region(change);
         let length = format!("{:.2} % {}", 100.0 * focus.abs(), if focus > 0.0 { "longer" } else { "shorter" });

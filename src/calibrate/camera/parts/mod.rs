@@ -1,5 +1,6 @@
-//! Whether the pictures of a set are all of one camera that was read out in one way. Parts of the set are compared
-//! while the board may have any shape: a turned picture is no bent board (docs/math.md, Camera calibration (14)).
+//! Checks that all pictures of a set come from one camera with one readout. Parts of the set are compared while the
+//! board may have any shape, because a turned picture must not pass for a bent board (docs/math.md, Camera
+//! calibration (14)).
 
 mod chance;
 mod change;

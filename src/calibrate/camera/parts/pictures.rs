@@ -1,5 +1,5 @@
-//! The pictures of a set as the comparison of its parts takes them: corners, and what they tell of the camera and of
-//! the board's shape while each picture's pose is left to it.
+//! The pictures of a set for the comparison of its parts: their corners, and their information about the camera and
+//! the board's shape with each picture's pose eliminated.
 
 use crate::calibrate::boards::shape::Basis;
 use crate::calibrate::camera::bundle::{Bent, Corner, State};
@@ -12,12 +12,12 @@ use crate::solve::{Loss, robust_scale};
 
 pub type Pose = Rigid<Camera, Board>;
 
-/// Usual size of a coefficient of the board's shape, over half of the board's length: more than print and plate are
-/// off.
+/// Usual size of a coefficient of the board's shape, as a share of half of the board's length. It exceeds any real
+/// deviation of print and plate.
 const USUAL_SHAPE: f64 = 0.01;
 
-/// All pictures, and what is free: the camera's numbers that were estimated, and the board's shape where all pictures
-/// show one board.
+/// All pictures, and the free parameters: the camera's estimated ones, and the board's shape if all pictures show one
+/// board.
 pub struct Set {
     corners: Vec<Vec<Corner>>,
     pub like: Intrinsics,
@@ -26,7 +26,7 @@ pub struct Set {
     pub held: Vec<usize>,
 }
 
-/// Camera, shape and poses that were fitted.
+/// Fitted camera, shape and poses.
 #[derive(Clone)]
 pub struct Stand {
     pub camera: Parameters,
@@ -34,11 +34,11 @@ pub struct Stand {
     pub poses: Vec<Pose>,
 }
 
-/// Some pictures as one camera sees them, each with its best pose.
+/// Some pictures fitted with one camera, each with its best pose.
 pub struct Look {
     pub poses: Vec<Pose>,
     pub told: Vec<Told>,
-    /// Lengths of the residuals, over the corners' sigmas.
+    /// Lengths of the residuals over the corners' sigmas.
     lengths: Vec<Vec<f64>>,
 }
 
@@ -69,12 +69,12 @@ impl Set {
         (0..all).filter(|i| !self.held.contains(i)).collect()
     }
 
-    /// What is believed of the shape beforehand: the usual size of a free parameter, none of the camera's.
+    /// Prior of the shape: the usual size of a free parameter; `None` for the camera's.
     pub fn usual(&self, parameter: usize) -> Option<f64> {
         Some(self.bent?.usual_of(parameter.checked_sub(PARAMETERS)?))
     }
 
-    /// Number of coordinates that were seen.
+    /// Number of observed coordinates.
     pub fn coordinates(&self) -> usize {
         2 * self.corners.iter().map(Vec::len).sum::<usize>()
     }
@@ -86,7 +86,7 @@ impl Set {
         sigmas.get(sigmas.len() / 2).copied().unwrap_or(0.0)
     }
 
-    /// `None` where a board is not seen by this camera.
+    /// Fits the poses of these pictures; `None` if a board is not visible to this camera.
     pub fn look(&self, which: &[usize], camera: &Parameters, shape: &[f64], poses: &[Pose]) -> Option<Look> {
         let corners: Vec<Vec<Corner>> = which.iter().map(|&i| self.corners[i].clone()).collect();
         let fit = Fit { corners: &corners, like: &self.like, loss: self.loss, bent: self.bent };
@@ -98,7 +98,7 @@ impl Set {
         Some(Look { poses: placed.state.poses, told, lengths })
     }
 
-    /// Each picture's cost: its squared residuals, those beyond the loss's threshold counting less.
+    /// Cost of each picture: its squared residuals, with reduced weight beyond the loss's threshold.
     pub fn costs(&self, look: &Look, scale: f64) -> Vec<f64> {
         let cost = |r: &f64| self.loss.at((r / scale).powi(2)).0;
         look.lengths.iter().map(|l| l.iter().map(cost).sum()).collect()

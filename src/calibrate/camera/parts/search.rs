@@ -1,26 +1,28 @@
-//! Which pictures would gain most from a camera of their own. Everything is taken as linear in the camera's numbers, so
-//! that thousands of choices are weighed at once.
+//! Selects the pictures that would gain most from a camera of their own. Everything is linearised in the camera's
+//! parameters, so that thousands of selections can be compared.
 
 use super::chance::ln_sets;
 use super::pictures::Set;
 use crate::calibrate::camera::repeat::Told;
 use nalgebra::{DMatrix, DVector};
 
-/// Starts that are followed to their best neighbour, and rounds of that.
+/// Number of start selections that are followed to their best neighbour, and rounds of that.
 const STARTS: usize = 12;
 const ROUNDS: usize = 30;
-/// A change has no information of its own beyond this share: what the shared numbers explain as well is not counted.
+/// Relative regularisation of a change's information: the part that the shared parameters explain equally well does
+/// not count.
 const RIDGE: f64 = 1e-9;
 
-/// What the pictures tell of a change of some of them, the shared numbers left free.
+/// Information of the pictures about a change of some of them, with the shared parameters free.
 pub struct Linear {
-    /// Of each picture: information on its change, the part of it that the shared numbers can take, and its pull.
+    /// Per picture: information about its change, the part of it that the shared parameters can absorb, and its
+    /// gradient.
     own: Vec<DMatrix<f64>>,
     shared: Vec<DMatrix<f64>>,
     pull: Vec<DVector<f64>>,
 }
 
-/// Information of what is believed beforehand, for residuals of this variance.
+/// Information of the priors, for residuals of this variance.
 pub fn beforehand(set: &Set, variance: f64) -> DMatrix<f64> {
     let free = set.free();
     DMatrix::from_diagonal(&DVector::from_iterator(
@@ -30,7 +32,8 @@ pub fn beforehand(set: &Set, variance: f64) -> DMatrix<f64> {
 }
 
 impl Linear {
-    /// `directions`: of the change, over the free parameters. `told` at the optimum of the shared numbers.
+    /// `directions`: derivatives of the free parameters by the change. `told`: at the optimum of the shared
+    /// parameters.
     pub fn new(told: &[Told], prior: &DMatrix<f64>, directions: &DMatrix<f64>) -> Option<Linear> {
         let all = told.iter().fold(prior.clone(), |sum, t| sum + &t.0);
         let lower = all.cholesky()?.l();
@@ -42,7 +45,7 @@ impl Linear {
         })
     }
 
-    /// What a change of these pictures takes off the sum of squares.
+    /// Decrease of the sum of squares by a change of these pictures.
     pub fn gain(&self, other: &[bool]) -> f64 {
         let those = || (0..other.len()).filter(|&i| other[i]);
         let sum = |all: &[DMatrix<f64>]| those().map(|i| &all[i]).sum::<DMatrix<f64>>();
@@ -56,8 +59,8 @@ impl Linear {
         left.cholesky().map_or(0.0, |c| pull.dot(&c.solve(&pull)).max(0.0))
     }
 
-    /// The choice of at most half of the pictures that is likeliest: its gain against what the pictures scatter by,
-    /// and against the number of such choices.
+    /// The likeliest selection of at most half of the pictures: its gain is weighed against the pictures' scatter and
+    /// the number of such selections.
     pub fn best(&self, variance: f64) -> Vec<bool> {
         let n = self.own.len();
         let numbers = self.own[0].nrows().min(2) as f64;
@@ -99,7 +102,7 @@ fn toggled(other: &[bool], i: usize) -> Vec<bool> {
     next
 }
 
-/// Some pictures, and at most half of them.
+/// Whether at least one and at most half of the pictures are selected.
 pub fn is_smaller_part(other: &[bool]) -> bool {
     let count = other.iter().filter(|o| **o).count();
     count > 0 && 2 * count <= other.len()

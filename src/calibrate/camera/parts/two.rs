@@ -1,5 +1,5 @@
-//! Two cameras solved together: that of most pictures, and that of the others, which differs from it by a change of one
-//! kind. The board and its shape are the same.
+//! Two cameras solved together: the camera of most pictures, and that of the others, which differs by a change of one
+//! kind. The board and its shape are the same for both.
 
 use super::change::Kind;
 use super::pictures::{Look, Set, Stand};
@@ -8,15 +8,16 @@ use crate::calibrate::camera::repeat::Told;
 use crate::camera::{PARAMETERS, Parameters};
 use nalgebra::{DMatrix, DVector};
 
-/// Steps at most, and how often the pictures are sorted anew.
+/// Largest number of steps, and number of times that the pictures are reassigned.
 const STEPS: usize = 16;
 const SORTED: usize = 3;
-/// Squared length of a step, in its own sigmas, that is not worth another one.
+/// Squared length of a step, in its own sigmas, below which the solve has converged.
 const SETTLED: f64 = 0.01;
-/// Corners of pictures may weigh so much in the scatter's estimate at most where one of them alone tells of a number.
+/// Relative floor of the weights in the scatter's estimate, for the case that one picture alone determines a
+/// parameter.
 const LEAST_SHARE: f64 = 1e-6;
 
-/// The set in two parts; no picture is in the second where `other` says so of none.
+/// The set in two parts: the pictures marked in `other` belong to the second, which may be empty.
 pub struct Two {
     pub kind: Kind,
     pub other: Vec<bool>,
@@ -26,7 +27,7 @@ pub struct Two {
 }
 
 impl Two {
-    /// From what was solved for all pictures together; sorts the pictures anew while it solves.
+    /// Starts from the solution for all pictures together, and reassigns the pictures during the solve.
     pub fn solved(set: &Set, from: &Stand, kind: Kind, other: Vec<bool>) -> Option<Two> {
         let numbers = kind.directions(&set.like).ncols();
         let (stand, change, looks) = (from.clone(), DVector::zeros(numbers), [None, None]);
@@ -79,12 +80,13 @@ impl Two {
         Some(())
     }
 
-    /// Typical residual of each part, over the corners' sigmas.
+    /// Typical residual of each part over the corners' sigmas.
     pub fn scales(&self) -> [f64; 2] {
         [0, 1].map(|i| self.looks[i].as_ref().map_or(0.0, Look::scale))
     }
 
-    /// How each picture's free parameters depend on the joint ones: the shared, then the change's.
+    /// Derivatives of each picture's free parameters by the joint ones: the shared parameters, then those of the
+    /// change.
     fn design(&self, set: &Set, second: bool) -> DMatrix<f64> {
         let free = set.free();
         let directions = free_rows(set, &self.kind.directions(&set.like));
@@ -100,7 +102,7 @@ impl Two {
         design
     }
 
-    /// Every picture's word, with the design of its part, in the parts' order.
+    /// The information of every picture, with the design of its part, in the order of the parts.
     fn told<'a>(&'a self, designs: &'a [DMatrix<f64>; 2]) -> impl Iterator<Item = (&'a Told, &'a DMatrix<f64>)> {
         self.looks.iter().zip(designs).flat_map(|(l, d)| l.iter().flat_map(move |l| l.told.iter().map(move |t| (t, d))))
     }
@@ -117,7 +119,7 @@ impl Two {
         self.told(designs).fold(all, |sum, (t, d)| sum + d.transpose() * &t.0 * d)
     }
 
-    /// One step of Gauss and Newton; its squared length in its own sigmas.
+    /// One Gauss-Newton step; returns its squared length in its own sigmas.
     fn step(&mut self, set: &Set) -> Option<f64> {
         let designs = self.designs(set);
         let variance = self.scales()[0].powi(2);
@@ -144,7 +146,7 @@ impl Two {
         possible.then(|| step.dot(&(information * &step)) / variance)
     }
 
-    /// Which pictures fit the second camera better.
+    /// The pictures that fit the second camera better.
     fn sorted(&self, set: &Set) -> Option<Vec<bool>> {
         let all: Vec<usize> = (0..set.len()).collect();
         let scale = self.scales()[0];
@@ -155,7 +157,7 @@ impl Two {
         Some(cost(&first)?.iter().zip(cost(&second)?).map(|(a, b)| b < *a).collect())
     }
 
-    /// Sum of the pictures' costs at a scale, with what the shape costs.
+    /// Sum of the pictures' costs at a scale, plus the cost of the shape's prior.
     pub fn cost(&self, set: &Set, scale: f64) -> f64 {
         let seen: f64 = self.looks.iter().flatten().flat_map(|l| set.costs(l, scale)).sum();
         let shape = self.stand.shape.iter().enumerate();
@@ -172,7 +174,7 @@ impl Two {
         let of = |kind: Kind| -> Option<(f64, f64)> {
             let directions = free_rows(set, &kind.directions(&set.like));
             let variance = self.scales()[0].powi(2);
-            // Each picture's pull along the change, and its variance where all others and the picture fix the rest.
+            // Each picture's pull along the change, and the variance of that pull with all other parameters fitted.
             let pulls: Vec<(DVector<f64>, DMatrix<f64>)> = self
                 .told(&designs)
                 .map(|(t, d)| {
@@ -197,7 +199,7 @@ impl Two {
     }
 }
 
-/// Rows of the free parameters; a shape has none.
+/// Rows of the free parameters of the camera; those of the shape are zero.
 pub fn free_rows(set: &Set, of_camera: &DMatrix<f64>) -> DMatrix<f64> {
     let free = set.free();
     DMatrix::from_fn(free.len(), of_camera.ncols(), |row, c| {

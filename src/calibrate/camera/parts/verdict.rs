@@ -1,4 +1,4 @@
-//! Names the pictures that are not of the camera as the others show it.
+//! Names the pictures that come from another camera than the others.
 
 use super::chance::{ln_sets, ln_tail};
 use super::change::{FREE, Kind};
@@ -9,42 +9,43 @@ use crate::calibrate::camera::intrinsics::{Observation, SolveOptions, Solved};
 use crate::camera::Flip;
 use crate::fault::Fault;
 
-/// Fewest pictures of which some can be told from the rest.
+/// Smallest set in which some pictures can be distinguished from the rest.
 const FEWEST: usize = 5;
-/// Probability at which chance may accuse a right set.
+/// Largest probability that chance accuses a correct set.
 const BY_CHANCE: f64 = 1e-4;
-/// Kinds that are tried: three with numbers, three flips.
+/// Number of kinds that are tried: three with parameters, three flips.
 const KINDS: f64 = 6.0;
-/// Before it is solved for, a change must look so likely by this share of the logarithm.
+/// A change or a flip is only solved for if its preliminary estimate reaches this share of the required
+/// log-probability.
 const WORTH_A_LOOK: f64 = 0.5;
-/// The second part's typical residual with its camera may be so many times the first's: what fits neither camera is
-/// no picture of another one.
+/// Largest typical residual of the second part with its own camera, as a multiple of the first part's. Pictures that
+/// fit neither camera are not pictures of another one.
 const EXPLAINED: f64 = 2.0;
-/// The second part's typical residual with the first's camera must be at least so many times that with its own. What
-/// lens model and print leave out favours another camera too: for 5 of 13 photographs of one real camera, a focal
-/// length 0.7 % longer gave 0.03 px in place of 0.05 (1.7 times). Photographs of two cameras gave 3.4 times.
+/// Smallest ratio of the second part's typical residual with the first camera to that with its own. Errors of lens
+/// model and print favour another camera too. For 5 of 13 photographs of one real camera, a focal length 0.7 % longer
+/// gave 0.03 px instead of 0.05 (1.7 times). Photographs of two cameras gave 3.4 times.
 const CLEARLY: f64 = 2.5;
 
-/// Pictures that another camera took, or that were read out otherwise.
+/// Pictures that another camera took, or that were read out differently.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Apart {
-    /// Indices.
+    /// Indices of the pictures.
     pub which: Vec<usize>,
-    /// "turned by 180 degrees".
+    /// The difference in words, such as "turned by 180 degrees".
     pub how: String,
-    /// Typical residuals of these pictures as they are and with that change, px.
+    /// Typical residuals of these pictures without and with that change, px.
     pub misfit_px: [f64; 2],
     cause: &'static str,
 }
 
 impl Apart {
-    /// Of one picture that is left out.
+    /// Reason for excluding a single picture.
     pub fn reason(&self) -> String {
         let [is, then] = self.misfit_px;
         format!("it fits the others' camera to {is:.2} px, and to {then:.2} px if it is {}; {}", self.how, self.cause)
     }
 
-    /// Of a set that cannot be used.
+    /// Fault of a set that cannot be used.
     pub fn fault(&self, pictures: &[Observation]) -> Fault {
         const MOST: usize = 12;
         let (count, all) = (self.which.len(), pictures.len());
@@ -63,7 +64,7 @@ impl Apart {
     }
 }
 
-/// The pictures that are apart from the others; `None` for a set of one camera that was read out in one way.
+/// The pictures that differ from the others; `None` for a set of one camera with one readout.
 pub fn apart(pictures: &[Observation], solved: &Solved, options: &SolveOptions) -> Option<Apart> {
     if pictures.len() < FEWEST {
         return None;
@@ -84,7 +85,7 @@ pub fn apart(pictures: &[Observation], solved: &Solved, options: &SolveOptions) 
         }
         let Some(two) = Two::solved(&set, &one.stand, kind, other) else { continue };
         let mut tried = vec![judged(&set, &one, &two)];
-        // A flip moves the principal point, so that a free change of that looks likely first.
+        // A flip moves the principal point, so a free change of the principal point already looks likely.
         if kind != Kind::Focus && tried[0].as_ref().is_some_and(|t| t.chance < WORTH_A_LOOK * limit(&two.other)) {
             let flips = Flip::ALL
                 .into_iter()
@@ -96,16 +97,16 @@ pub fn apart(pictures: &[Observation], solved: &Solved, options: &SolveOptions) 
     best.map(|b| b.apart)
 }
 
-/// Logarithm of the probability below which a part of the set is believed.
+/// Logarithm of the probability below which a split of the set is accepted.
 fn limit(other: &[bool]) -> f64 {
     BY_CHANCE.ln() - KINDS.ln() - ln_sets(other)
 }
 
 struct Tried {
-    /// Logarithm of the probability that chance explains it.
+    /// Logarithm of the probability that chance explains the gain.
     chance: f64,
     sure: bool,
-    /// Half of the gain less what the change's numbers are worth by the count of the corners.
+    /// Half of the gain minus half of the parameters' number times the logarithm of the number of coordinates.
     worth: f64,
     apart: Apart,
 }

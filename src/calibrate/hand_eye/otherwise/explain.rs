@@ -1,4 +1,4 @@
-//! Of all that would make the pairs fit, the plainest that fits well, in words.
+//! Of all changes that would make the pairs fit, the simplest one that fits well, in words.
 
 use super::explanation::Explanation;
 use super::present::Present;
@@ -7,11 +7,11 @@ use crate::calibrate::hand_eye::closed::Pair;
 use crate::calibrate::hand_eye::options::{HandEyeOptions, Mount};
 use crate::fault::Fault;
 
-/// Explanations that fit this many times worse than the best one are not told.
+/// Explanations that fit this many times worse than the best one are not reported.
 const WORSE: f64 = 1.5;
 
-/// What would make the pairs fit much better. `order_too`: whether they may be paired wrongly. `left_out`: how many
-/// pairs agree with no other.
+/// A change that would make the pairs fit much better. `order_too`: whether the pairing may be wrong. `left_out`:
+/// number of pairs that disagree with the others.
 pub fn find(pairs: &[Pair], mount: Mount, order_too: bool, left_out: usize, o: &HandEyeOptions) -> Option<Explanation> {
     let now = Present { pairs, seed: o.seed };
     let mut all: Vec<Explanation> = lengths::explain(&now, o).into_iter().collect();
@@ -27,7 +27,7 @@ pub fn find(pairs: &[Pair], mount: Mount, order_too: bool, left_out: usize, o: &
     all.into_iter().min_by(|a, b| (a.changes, a.fits.then).partial_cmp(&(b.changes, b.fits.then)).expect("finite"))
 }
 
-/// For pairs on which no fit succeeded: says why, if that can be found out.
+/// For pairs on which no fit succeeded: the reason, if one is found.
 pub fn explain(pairs: &[Pair], what: String, mount: Mount, o: &HandEyeOptions) -> Fault {
     match find(pairs, mount, true, pairs.len(), o) {
         Some(e) => e.fault(what),

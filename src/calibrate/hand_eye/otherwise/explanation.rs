@@ -1,26 +1,26 @@
-//! Something with which pairs would fit that do not, in words.
+//! A change that would make pairs fit that do not, in words.
 
 use super::present::Fits;
 use crate::fault::Fault;
 
-/// Something with which the pairs would fit. It is told, and never done.
+/// A change that would make the pairs fit. It is reported but never applied.
 pub struct Explanation {
-    /// What is wrong, where the fit itself does not say it.
+    /// The fault, if the fit does not state it.
     pub what: String,
-    /// What they would fit with, and how well.
+    /// The change that would make them fit, and the misfit with it.
     pub cause: String,
-    /// What a person does about it.
+    /// What the user can do about it.
     pub next: String,
-    /// How well they would fit, and how well they do.
+    /// Misfit with the change and without it.
     pub fits: Fits,
-    /// How much is changed by it: the fewer the likelier.
+    /// Size of the change; smaller changes are likelier.
     pub changes: u32,
-    /// The transform would be wrong, not only some pairs left out.
+    /// True if the fault makes the transform wrong, rather than only excluding some pairs.
     pub refuses: bool,
 }
 
 impl Explanation {
-    /// A refusal that says it; `measured` is what is wrong where it has no words of its own.
+    /// A refusal with this explanation; `measured` is its fault if `what` is empty.
     pub fn fault(self, measured: String) -> Fault {
         let what = if self.what.is_empty() { measured } else { self.what };
         Fault::input(what).cause(self.cause).next(self.next)

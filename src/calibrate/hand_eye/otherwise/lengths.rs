@@ -6,16 +6,17 @@ use crate::calibrate::hand_eye::closed::{Pair, agree, robot_scale};
 use crate::calibrate::hand_eye::options::HandEyeOptions;
 use crate::geometry::Rigid;
 
-/// Lengths of robot and board may differ by this share before one of them is called wrong.
+/// Relative difference between the lengths of robot and board up to which neither counts as wrong.
 const TOLERANCE: f64 = 0.01;
 
-/// The pairs with the robot's lengths multiplied.
+/// The pairs with the robot's lengths multiplied by `scale`.
 fn scaled(pairs: &[Pair], scale: f64) -> Vec<Pair> {
     let at = |p: &Pair| p.at(Rigid::new(p.near_from_far.rotation, p.near_from_far.translation * scale));
     pairs.iter().map(at).collect()
 }
 
-/// A factor on the robot's lengths with which the pairs agree at least twice as well, all of them and in the median.
+/// A factor on the robot's lengths that improves the agreement at least twofold, both in the median and over all
+/// pairs.
 pub fn explain(now: &Present<'_>, o: &HandEyeOptions) -> Option<Explanation> {
     let before = agree(now.pairs, now.seed)?;
     let of = |pairs: Vec<&Pair>| robot_scale(&pairs).filter(|s| *s > 0.0 && (s - 1.0).abs() > TOLERANCE);
@@ -23,7 +24,7 @@ pub fn explain(now: &Present<'_>, o: &HandEyeOptions) -> Option<Explanation> {
     let candidates = [agreeing, of(now.pairs.iter().collect())];
     let fitting = candidates.into_iter().flatten().filter_map(|scale| {
         let then = scaled(now.pairs, scale);
-        // Medians of few pairs halve by chance; the squares of all that agree do not.
+        // The median of few pairs halves by chance; the sum of squares of all agreeing pairs does not.
         let median = agree(&then, now.seed)?.spread;
         (median < 0.5 * before.spread).then(|| now.better(&then, 2.0)).flatten().map(|fits| (scale, fits))
     });

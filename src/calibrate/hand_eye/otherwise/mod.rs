@@ -1,5 +1,5 @@
-//! What would make pairs fit that do not: another notation of the poses, another order, another unit, a tool in a part
-//! of them.
+//! Changes that would make pairs fit that do not: another notation of the poses, another order, another unit, a tool
+//! in some of them.
 
 mod explain;
 mod explanation;

@@ -4,7 +4,7 @@ use super::explanation::Explanation;
 use super::present::Present;
 use crate::calibrate::hand_eye::closed::Pair;
 
-/// Pictures and poses slip against each other by so many places at most.
+/// Largest offset between the sequences of pictures and poses that is tried.
 const SLIPS: usize = 3;
 
 /// An order of the poses with which the pairs fit at least twice as well.

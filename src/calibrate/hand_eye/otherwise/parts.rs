@@ -1,5 +1,5 @@
-//! A part of the pairs that goes with the others but for one constant transform: a tool in the robot's poses, a camera
-//! or a board that was moved, another work frame, boards that were read turned.
+//! A group of pairs that fits the others except for one constant transform: a tool in the robot's poses, a camera or
+//! a board that was moved, another work frame, boards that were read rotated.
 
 use super::explanation::Explanation;
 use super::present::Present;
@@ -8,21 +8,21 @@ use crate::calibrate::hand_eye::options::Mount;
 use crate::geometry::{Board, Frame, Mat3, Rigid, Vec3, log, orthonormalise};
 use rand::SeedableRng;
 
-/// The pairs must fit so many times better with the transform than without: it is chosen, and so are the pairs that
-/// have it.
+/// Smallest factor by which the transform must improve the fit. It is above 1 because both the transform and its
+/// pairs are selected for the best fit.
 const BETTER: f64 = 5.0;
-/// Fewest pairs that agree with each other, and fewest that go with them but for the transform.
+/// Smallest number of pairs that agree with each other, and of pairs that fit them after the transform.
 const FEWEST: usize = 4;
 const FEWEST_OTHERS: usize = 2;
-/// Triples that are tried, as many as among 25 pairs.
+/// Number of triples that are tried, as many as 25 pairs have.
 const TRIPLES: usize = 2300;
-/// Chains of triples that are looked at closely.
+/// Number of candidate groups that are examined closely.
 const MOST: usize = 12;
-/// Pairs belong to the others where they fit less than so many times worse than the middle one of those.
+/// Pairs belong to a group if their misfit is at most this many times the group's median.
 const WITHIN: f64 = 6.0;
-/// A turn that is this near to quarters of a turn about the board's normal is one, rad.
+/// A rotation this close to a multiple of a quarter turn about the board's normal counts as one, rad.
 const QUARTER: f64 = 0.09;
-/// Two places of one board that was turned differ by less than this share of what the turn moves it by.
+/// Positions of one rotated board differ by less than this share of the displacement by the rotation.
 const PLACE: f64 = 0.1;
 
 /// A chain with the pairs that agree with it.
@@ -35,7 +35,7 @@ fn chosen<'a>(pairs: &'a [Pair], which: &[usize]) -> Vec<&'a Pair> {
     which.iter().map(|&i| &pairs[i]).collect()
 }
 
-/// Triples of pairs: all of them, or as many drawn ones.
+/// Triples of pairs: all of them, or a random selection.
 fn triples(n: usize, seed: u64) -> Vec<[usize; 3]> {
     if n * (n - 1) * (n - 2) / 6 <= TRIPLES {
         return (0..n).flat_map(|i| (0..i).flat_map(move |j| (0..j).map(move |k| [i, j, k]))).collect();
@@ -48,7 +48,7 @@ fn triples(n: usize, seed: u64) -> Vec<[usize; 3]> {
     (0..TRIPLES).map(|_| drawn()).collect()
 }
 
-/// Groups of pairs that agree with each other far better than with the rest, the most marked first.
+/// Groups of pairs that agree with each other far better than with the rest, the most distinct first.
 fn groups(now: &Present<'_>) -> Vec<Group> {
     let n = now.pairs.len();
     let mut marked: Vec<(f64, Vec<usize>)> = Vec::new();
@@ -56,7 +56,7 @@ fn groups(now: &Present<'_>) -> Vec<Group> {
         let Some(chain) = park_martin(&chosen(now.pairs, &triple)) else { continue };
         let mut order: Vec<(f64, usize)> = now.pairs.iter().map(|p| chain.misfit(p)).zip(0..).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // Where the misfits jump the rest begins.
+        // The rest begins at the largest jump of the sorted misfits.
         let jump = |k: usize| order[k].0 / order[k - 1].0.max(1e-6);
         let ends = FEWEST..=n.saturating_sub(FEWEST_OTHERS);
         let Some(end) = ends.filter(|&k| k < n).max_by(|&a, &b| jump(a).total_cmp(&jump(b))) else { continue };
@@ -78,7 +78,7 @@ fn groups(now: &Present<'_>) -> Vec<Group> {
     out
 }
 
-/// The chain of some pairs, and all that agree with it.
+/// The chain of some pairs, and all pairs that agree with it.
 fn settled(pairs: &[Pair], mut members: Vec<usize>) -> Option<Group> {
     for _ in 0..3 {
         let chain = park_martin(&chosen(pairs, &members))?;
@@ -98,23 +98,23 @@ fn settled(pairs: &[Pair], mut members: Vec<usize>) -> Option<Group> {
     Some(Group { chain: park_martin(&chosen(pairs, &members))?, members })
 }
 
-/// The mean of transforms that are nearly the same, their places at the origin.
+/// The mean of nearly equal transforms, averaging their translations.
 fn mean<A: Frame, B: Frame>(all: &[Rigid<A, B>]) -> Rigid<A, B> {
     let rotation = orthonormalise(&all.iter().map(|t| t.rotation).sum::<Mat3>());
     Rigid::new(rotation, all.iter().map(|t| t.translation).sum::<Vec3>() / all.len() as f64)
 }
 
-/// A constant transform that makes the rest go with a group.
+/// A constant transform that makes the rest fit a group.
 enum Constant {
-    /// Between the flange and what the robot's poses are of, for the rest: flange_from_tool.
+    /// Between the flange and the frame that the robot's poses refer to, for the rest: flange_from_tool.
     OnFlange(Rigid<Near, Near>),
-    /// The board, the camera or the base's frame stood elsewhere.
+    /// The board, the camera or the base frame was at another pose.
     InBase(Rigid<Near, Near>),
-    /// Boards were read turned, by quarters of a turn.
+    /// Boards were read rotated by multiples of a quarter turn: index of the pair, number of quarters.
     Turned(Vec<(usize, usize)>),
 }
 
-/// Ways to make the rest go with a group, with the pairs that they make.
+/// Transforms that make the rest fit a group, with the resulting pairs.
 fn constants(pairs: &[Pair], g: &Group, mount: Mount) -> Vec<(Constant, Vec<Pair>)> {
     let rest: Vec<usize> = (0..pairs.len()).filter(|i| !g.members.contains(i)).collect();
     if rest.len() < FEWEST_OTHERS {
@@ -137,7 +137,7 @@ fn constants(pairs: &[Pair], g: &Group, mount: Mount) -> Vec<(Constant, Vec<Pair
     let (near, far) = (mean(&by_near), mean(&by_far));
     let on_near = changed(&|p| p.at(near * p.near_from_far));
     let on_far = changed(&|p| p.at(p.near_from_far * far));
-    // Of the frames only the numbers are told.
+    // Only the numbers of the transform are reported, not its frames.
     let plain = Rigid::<Near, Near>::new(far.rotation, far.translation);
     let of_flange = |t: Rigid<Near, Near>| Constant::OnFlange(t);
     let mut out = match mount {
@@ -148,13 +148,14 @@ fn constants(pairs: &[Pair], g: &Group, mount: Mount) -> Vec<(Constant, Vec<Pair
     out
 }
 
-/// The rest's boards turned by quarters about their normal, all that are turned alike in one place.
+/// The rest's boards rotated by quarter turns about their normal, if all boards with the same rotation agree on one
+/// position.
 fn turned(pairs: &[Pair], rest: &[usize], boards: &[Rigid<Board, Board>]) -> Option<(Constant, Vec<Pair>)> {
     let quarter = |d: &Rigid<Board, Board>| {
         let v = log(&d.rotation);
         let turns = (v.z / std::f64::consts::FRAC_PI_2).round();
         let off = Vec3::new(v.x, v.y, v.z - turns * std::f64::consts::FRAC_PI_2).norm();
-        // At half a turn the vector's sign is free.
+        // At half a turn the sign of the rotation vector is arbitrary.
         let tilt = d.rotation[(2, 2)].clamp(-1.0, 1.0).acos();
         let half = (v.norm() - std::f64::consts::PI).abs() < QUARTER && tilt < QUARTER;
         if half { Some(2) } else { Some(turns.rem_euclid(4.0) as usize).filter(|t| *t != 0 && off < QUARTER) }
@@ -179,7 +180,7 @@ fn turned(pairs: &[Pair], rest: &[usize], boards: &[Rigid<Board, Board>]) -> Opt
     Some((Constant::Turned(rest.iter().copied().zip(quarters).collect()), out))
 }
 
-/// The rest of the pairs by name: `pose 7 to pose 13`.
+/// Names of the given pairs, such as `pose 7 to pose 13`.
 fn names(pairs: &[Pair], which: &[usize]) -> String {
     const MOST_NAMES: usize = 6;
     let name = |i: usize| pairs[i].seen.name.as_str();
@@ -196,13 +197,13 @@ fn names(pairs: &[Pair], which: &[usize]) -> String {
 fn transform(t: &Rigid<Near, Near>) -> String {
     let (p, angle) = (t.translation, log(&t.rotation).norm().to_degrees());
     let turn = if angle < 0.5 { String::new() } else { format!(" and a turn of {angle:.1} degrees") };
-    // A zero is printed without its sign.
+    // Adding 0.0 removes the sign of a negative zero.
     let [x, y, z] = [p.x, p.y, p.z].map(|v| (v * 10.0).round() / 10.0 + 0.0);
     format!("({x:.1}, {y:.1}, {z:.1}) mm{turn}")
 }
 
 impl Constant {
-    /// The same, said of the group in place of the rest.
+    /// The same transform, stated for the group instead of the rest.
     fn inverse(self) -> Constant {
         match self {
             Constant::OnFlange(t) => Constant::OnFlange(t.inverse()),
@@ -213,7 +214,7 @@ impl Constant {
 
     fn explained(self, now: &Present<'_>, g: &Group, mount: Mount, fits: super::present::Fits) -> Explanation {
         let rest: Vec<usize> = (0..now.pairs.len()).filter(|i| !g.members.contains(i)).collect();
-        // The smaller part is the one that is named.
+        // The message names the smaller of the two parts.
         let (told, part) = if rest.len() > g.members.len() { (self.inverse(), &g.members) } else { (self, &rest) };
         let who = names(now.pairs, part);
         let well = format!("{who} ({} of {}) fit the others to {:.3} mm", part.len(), now.pairs.len(), fits.then);
@@ -260,7 +261,7 @@ impl Constant {
     }
 }
 
-/// A constant transform with which a part of the pairs goes with the others.
+/// A constant transform with which one part of the pairs fits the others.
 pub fn explain(now: &Present<'_>, mount: Mount) -> Option<Explanation> {
     if now.pairs.len() < FEWEST + FEWEST_OTHERS {
         return None;

@@ -1,4 +1,4 @@
-//! Every way in which the numbers of a position can be meant: order, sign and unit. mm as they were read.
+//! All possible meanings of a position's numbers: order, sign and unit. Lengths are in mm as read.
 
 use crate::geometry::Vec3;
 use crate::robot::Convention;
@@ -11,10 +11,11 @@ pub struct Form {
 }
 
 impl Form {
-    /// As they were read.
+    /// Unchanged.
     pub const PLAIN: Form = Form { order: [0, 1, 2], sign: [1.0; 3] };
 
-    /// Other orders, other signs. Both at once with other axes of the angles are the same as one of them.
+    /// Other orders, or other signs. Both at once, combined with other axes of the angles, are equivalent to one of
+    /// them.
     pub fn all() -> impl Iterator<Item = Form> {
         let orders = [[0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]].map(|order| Form { order, ..Form::PLAIN });
         let signs = (0..8u8).rev().map(|bits| Form {
@@ -29,7 +30,7 @@ impl Form {
         Vec3::new(t[self.order[0]] * self.sign[0], t[self.order[1]] * self.sign[1], t[self.order[2]] * self.sign[2])
     }
 
-    /// How far it is from what was read: 0 is the same.
+    /// Size of the change from the numbers as read; 0 for no change.
     pub fn changes(&self) -> u32 {
         match self {
             f if *f == Form::PLAIN => 0,
@@ -65,16 +66,17 @@ const UNITS: [Unit; 5] = [
     Unit { name: "centimetres", mm: 10.0 },
     Unit { name: "micrometres", mm: 1e-3 },
 ];
-/// A factor on lengths this near to a unit's is that unit; a wrong board is told apart with right notation only.
+/// A factor on lengths within this share of a unit's counts as that unit. A board of the wrong size is recognised
+/// only with the right notation.
 const NEAR: f64 = 0.03;
 
 impl Unit {
-    /// That of a convention's positions.
+    /// The length unit of a convention's positions.
     pub fn of(convention: Convention) -> Unit {
         let metres = convention.labels()[0].ends_with(" m");
         UNITS[usize::from(metres)]
     }
-    /// The unit that the file is in where lengths that were read in `self` must be multiplied by `factor`.
+    /// The unit of the file if lengths that were read in `self` have to be multiplied by `factor`.
     pub fn times(self, factor: f64) -> Option<Unit> {
         UNITS.into_iter().find(|u| (factor * self.mm / u.mm - 1.0).abs() < NEAR)
     }

@@ -1,27 +1,27 @@
-//! The pairs as they are, and by how much a changed set fits better.
+//! The pairs as given, and the improvement by a changed set.
 
 use crate::calibrate::hand_eye::chance::{BY_CHANCE, chance, misfit};
 use crate::calibrate::hand_eye::closed::{Pair, agree};
 
-/// The pairs as they were given.
+/// The pairs as given.
 pub struct Present<'a> {
     /// In the order given.
     pub pairs: &'a [Pair],
-    /// Of the draws.
+    /// Seed of the random draws.
     pub seed: u64,
 }
 
-/// How a changed set fits, mm at the board's corners, rms over the pairs that agree.
+/// Misfit of a changed set and of the original one, mm at the board's landmarks, rms over the agreeing pairs.
 pub struct Fits {
-    /// Changed.
+    /// Misfit with the change.
     pub then: f64,
-    /// The same pairs as they are.
+    /// Misfit of the same pairs without the change.
     pub now: f64,
 }
 
 impl Present<'_> {
-    /// How the changed pairs fit; `None` unless four fifths of them agree, `times` better than now and better than by
-    /// chance.
+    /// Misfit of the changed pairs. `None` unless four fifths of them agree, and the fit is `times` better than now
+    /// and better than chance.
     pub fn better(&self, changed: &[Pair], times: f64) -> Option<Fits> {
         let found = agree(changed, self.seed)?;
         if found.agreeing.len() * 5 < changed.len() * 4 {

@@ -1,35 +1,35 @@
-//! Every way in which the numbers of an orientation can be meant: angles about which axes and in which order, rotation
-//! vectors, quaternions, orient and approach vectors, matrices. Degrees or radians as the numbers have them.
+//! All possible meanings of an orientation's numbers: angles about any axes in any order, rotation vectors,
+//! quaternions, orient and approach vectors, matrices. In degrees or radians.
 
 use crate::geometry::{Mat3, Vec3, exp, log};
 use crate::robot::{Convention, Written, zyx_of};
 
-/// One factor of a product of turns: about which axis, by which of the numbers.
+/// One factor of a product of rotations: its axis, and the number that gives its angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turn {
-    /// 0 is x.
+    /// Axis of the rotation: 0 is x.
     pub axis: usize,
-    /// Place among the three.
+    /// Index of the angle among the three numbers.
     pub number: usize,
 }
 
-/// How numbers make a rotation.
+/// How numbers form a rotation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Orientation {
-    /// R is the product of these, as written from left to right.
+    /// R is the product of these factors, from left to right.
     Turns { factors: [Turn; 3], degrees: bool },
     /// Axis times angle.
     Vector { degrees: bool },
     /// Four numbers.
     Quaternion { real_first: bool },
-    /// The second and third column of R. Other columns are the same but for a turn of the flange, which no picture
-    /// tells.
+    /// The second and third column of R. Other pairs of columns differ only by a rotation of the flange, which no
+    /// picture shows.
     OrientApproach,
     /// Nine numbers, row by row.
     Matrix,
 }
 
-/// How a program turned numbers into the matrices that a file holds.
+/// How a program converted numbers into the matrices of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Made {
     /// R = Rz·Ry·Rx, degrees.
@@ -43,9 +43,9 @@ pub enum Made {
 /// One way to read orientations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
-    /// Of a file of matrices: the numbers were another program's, which made matrices of them.
+    /// For a file of matrices: how another program computed them from its numbers.
     pub made: Option<Made>,
-    /// What the numbers mean.
+    /// The meaning of the numbers.
     pub orientation: Orientation,
 }
 
@@ -54,11 +54,11 @@ fn turns(axes: [usize; 3], numbers: [usize; 3]) -> [Turn; 3] {
 }
 
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
-/// Products of turns whose first and last axis is the same.
+/// Products of rotations whose first and last axes are equal.
 const PROPER: [[usize; 3]; 6] = [[2, 1, 2], [2, 0, 2], [0, 1, 0], [0, 2, 0], [1, 0, 1], [1, 2, 1]];
 
 impl Orientation {
-    /// As a convention has it.
+    /// The meaning by a convention.
     pub fn of(convention: Convention) -> Orientation {
         let angles = |axes, numbers| Orientation::Turns { factors: turns(axes, numbers), degrees: true };
         match convention {
@@ -74,7 +74,7 @@ impl Orientation {
         }
     }
 
-    /// All that three angles can mean.
+    /// All possible meanings of three angles.
     fn of_angles(degrees: bool) -> impl Iterator<Item = Orientation> {
         let products = ORDERS.into_iter().flat_map(|axes| ORDERS.map(|numbers| turns(axes, numbers)));
         let proper = PROPER.into_iter().flat_map(|axes| [turns(axes, [0, 1, 2]), turns(axes, [2, 1, 0])]);
@@ -82,7 +82,7 @@ impl Orientation {
         turns.chain([Orientation::Vector { degrees }])
     }
 
-    /// The rotation that the numbers mean; `None` where they mean none.
+    /// The rotation that the numbers represent; `None` if they represent none.
     pub fn rotation(self, n: &[f64]) -> Option<Mat3> {
         let rotation = match self {
             Orientation::Turns { factors, degrees } => factors.iter().fold(Mat3::identity(), |product, t| {
@@ -107,18 +107,18 @@ impl Orientation {
     }
 }
 
-/// The rotation's numbers in a file of matrices.
+/// The numbers of the rotation in a row of a file of matrices.
 fn of_rows(rows: &[f64]) -> Vec<f64> {
     [0, 1, 2, 4, 5, 6, 8, 9, 10].map(|k| rows[k]).to_vec()
 }
 
 impl Reading {
-    /// As it was read.
+    /// The reading by the convention as stated.
     pub fn of(convention: Convention) -> Reading {
         Reading { made: None, orientation: Orientation::of(convention) }
     }
 
-    /// All ways to read the numbers of a convention, the convention's own among them.
+    /// All readings of a convention's numbers, including the convention's own.
     pub fn all(convention: Convention) -> Vec<Reading> {
         let plain = |orientation| Reading { made: None, orientation };
         let quaternions = [true, false].map(|real_first| Orientation::Quaternion { real_first });
@@ -139,7 +139,7 @@ impl Reading {
         }
     }
 
-    /// The numbers that this way reads, of a pose as the file has it.
+    /// The numbers that this reading uses, from a pose as written in the file.
     fn numbers(&self, written: &Written) -> Vec<f64> {
         let n = &written.numbers;
         if written.convention != Convention::Matrix {
@@ -153,7 +153,7 @@ impl Reading {
                 let [z, y, x] = zyx_of(&r);
                 [x, y, z]
             }
-            // The transpose of Rz·Ry·Rx of the opposite angles.
+            // The transpose of Rz·Ry·Rx with the opposite angles.
             Made::Xyz => {
                 zyx_of(&r.transpose()).map(|a| -a).into_iter().rev().collect::<Vec<_>>().try_into().expect("3")
             }
@@ -164,7 +164,7 @@ impl Reading {
                 return vec![half.cos(), axis.x, axis.y, axis.z];
             }
         };
-        // Both triples make this matrix; robots write the one whose middle angle is below a quarter turn.
+        // Two angle triples give this matrix; robots write the one whose middle angle is below a quarter turn.
         match self.orientation {
             Orientation::Turns { factors: [first, middle, last], .. }
                 if first.axis != last.axis && angles[middle.number].abs() > 90.0 =>
@@ -176,12 +176,12 @@ impl Reading {
         }
     }
 
-    /// The rotation of a pose, read this way.
+    /// The rotation of a pose under this reading.
     pub fn rotation(&self, written: &Written) -> Option<Mat3> {
         self.orientation.rotation(&self.numbers(written))
     }
 
-    /// Conventions that read orientations this way.
+    /// Conventions with this reading of orientations.
     pub fn conventions(&self) -> Vec<Convention> {
         let reads = |c: &Convention| Orientation::of(*c) == self.orientation;
         Convention::ALL.iter().copied().filter(reads).collect()

@@ -1,5 +1,5 @@
-//! Another notation in which the robot's poses would fit the pictures. Angles between poses do not depend on how the
-//! camera is mounted, so most notations fall out before any transform is solved for.
+//! Another notation in which the robot's poses would fit the pictures. Angles between poses do not depend on the
+//! camera's mount, so most notations are ruled out before any transform is solved for.
 
 use super::explanation::Explanation;
 use super::positions::{Form, Unit};
@@ -11,30 +11,30 @@ use crate::calibrate::hand_eye::options::Mount;
 use crate::geometry::{Base, Flange, Mat3, Rigid, Vec3, log, orthonormalise};
 use crate::robot::{Convention, Written};
 
-/// A notation must make the pairs fit so many times better than the one that was named. Of right sets none comes near:
-/// what noise leaves is left in every notation.
+/// Smallest factor by which another notation must improve the fit over the stated one. Correct sets stay far below
+/// it: noise remains in every notation.
 const BETTER: f64 = 3.0;
-/// Notations whose rotations miss the camera's by so many times as much as the best one's are left out, and this much
-/// more, rad.
+/// Notations are dropped if their rotation misfit to the camera exceeds the best one's by this factor plus this
+/// amount, rad.
 const WORSE: f64 = 3.0;
 const FINE: f64 = 0.01;
-/// So many ways to read rotations, and whole poses, are looked at closely.
+/// Number of readings of rotations, and of complete poses, that are examined closely.
 const MOST_ROTATIONS: usize = 24;
 const MOST_POSES: usize = 6;
-/// Pairs of poses that are compared.
+/// Number of pairs of poses that are compared.
 const MOST_LINKS: usize = 200;
-/// Fits nearer than this, as a share, are one and the same notation in other words.
+/// Relative difference between misfits below which two notations count as equivalent.
 const SAME: f64 = 1e-4;
-/// Notations that fit this many times worse than the best one are not told.
+/// Notations that fit this many times worse than the best one are not reported.
 const RIVAL: f64 = 1.5;
 
 /// One way to read the poses of a set.
 #[derive(Clone, Copy, PartialEq)]
 struct Notation {
     reading: Reading,
-    /// The file has the transpose of the rotation.
+    /// The file contains the transpose of the rotation.
     transposed: bool,
-    /// The file has flange_from_base.
+    /// The file contains flange_from_base.
     inverted: bool,
     form: Form,
     unit: Unit,
@@ -46,11 +46,11 @@ struct Numbers<'a> {
     mount: Mount,
     convention: Convention,
     written: Vec<Written>,
-    /// The numbers come from a file; false: from a wire, which has no notation.
+    /// True if the numbers come from a file; false if from a network connection, where no notation is in doubt.
     of_file: bool,
 }
 
-/// Two poses and what lies between them.
+/// Two poses and the camera's motion between them.
 struct Link {
     i: usize,
     j: usize,
@@ -76,7 +76,7 @@ impl<'a> Numbers<'a> {
         whole.then_some(Numbers { now, mount, convention, written, of_file })
     }
 
-    /// As the poses were read.
+    /// The notation in which the poses were read.
     fn as_read(&self) -> Notation {
         Notation {
             reading: Reading::of(self.convention),
@@ -106,7 +106,7 @@ impl<'a> Numbers<'a> {
         self.written.iter().map(|w| reading.rotation(w)).collect()
     }
 
-    /// The pairs read in another notation; lengths as they were read, times `scale`.
+    /// The pairs read in another notation; lengths as read, times `scale`.
     fn read(&self, n: &Notation, rotations: &[Mat3], scale: f64) -> Vec<Pair> {
         let pose = |(k, r): (usize, &Mat3)| {
             let rotation = if n.transposed { r.transpose() } else { *r };
@@ -119,24 +119,24 @@ impl<'a> Numbers<'a> {
     }
 }
 
-/// Rotations of all poses, read in one way, that go with the camera's.
+/// Rotations of all poses under one reading that is consistent with the camera's rotations.
 struct Turning {
     reading: Reading,
     rotations: Vec<Mat3>,
-    /// near_from_far is their transpose; else they are it themselves.
+    /// True if near_from_far has the transposed rotations; false if it has these.
     transposed: bool,
-    /// Median of what rotations between poses miss the camera's by, rad.
+    /// Median misfit of the rotations between poses to the camera's, rad.
     off: f64,
     /// Poses that agree with the others.
     agreeing: Vec<usize>,
 }
 
-/// Ways to read rotations, the best first.
+/// Readings of rotations, the best first.
 fn turnings(numbers: &Numbers<'_>) -> Vec<Turning> {
     let links = numbers.links();
     let own = [Reading::of(numbers.convention)];
     let all = if numbers.of_file { Reading::all(numbers.convention) } else { own.to_vec() };
-    // The sine of half the angle between two rotations does not change where all are turned by the same.
+    // The sine of half the angle between two rotations is invariant to a common rotation of all of them.
     let sine = |a: &Mat3, b: &Mat3| (a - b).norm() / 8f64.sqrt();
     let camera: Vec<f64> = links.iter().map(|l| (l.camera.norm() / 2.0).sin()).collect();
     let mut kept: Vec<(Reading, Vec<Mat3>, Vec<f64>, f64)> = Vec::new();
@@ -182,10 +182,10 @@ struct Candidate {
     rms: f64,
 }
 
-/// Positions that go with these rotations.
+/// Candidate positions for these rotations.
 fn candidates(numbers: &Numbers<'_>, t: &Turning) -> Vec<Candidate> {
     let mut out = Vec::new();
-    // Either the rotation was written transposed or the pose inverted: rotations alone do not tell.
+    // Either the rotation is transposed or the pose is inverted: rotations alone do not show which.
     let near_is_transposed = numbers.mount == Mount::EyeInHand;
     for inverted in [false, true] {
         let transposed = (t.transposed == near_is_transposed) == inverted;
@@ -211,14 +211,14 @@ fn candidates(numbers: &Numbers<'_>, t: &Turning) -> Vec<Candidate> {
 }
 
 impl Notation {
-    /// Conventions that read poses so, whole or but for the unit of lengths.
+    /// Conventions with this notation, completely (true) or except for the length unit (false).
     fn conventions(&self) -> (Vec<Convention>, bool) {
         let all = if self.reading.made.is_some() { Vec::new() } else { self.reading.conventions() };
         let whole: Vec<Convention> = all.iter().copied().filter(|c| Unit::of(*c) == self.unit).collect();
         if whole.is_empty() { (all, false) } else { (whole, true) }
     }
 
-    /// How far it is from what was read.
+    /// Size of the change from the notation as read.
     fn changes(&self, as_read: &Notation) -> u32 {
         let (conventions, whole) = self.conventions();
         let orientation = match self.reading.orientation {
@@ -237,7 +237,7 @@ impl Notation {
             + self.form.changes()
     }
 
-    /// What is read otherwise: `as gba (R = Rx(A)·Ry(B)·Rz(C), degrees), with positions in metres`.
+    /// The changed parts of the notation: `as gba (R = Rx(A)·Ry(B)·Rz(C), degrees), with positions in metres`.
     fn words(&self, as_read: &Notation, convention: Convention) -> String {
         let (conventions, whole) = self.conventions();
         let mut parts = Vec::new();
@@ -284,12 +284,12 @@ impl Notation {
     }
 }
 
-/// Another notation with which the pairs fit at least [`BETTER`] times better than as they were read.
+/// Another notation with which the pairs fit at least [`BETTER`] times better than as read.
 pub fn explain(now: &Present<'_>, mount: Mount) -> Option<Explanation> {
     let numbers = Numbers::of(now, mount)?;
     let as_read = numbers.as_read();
     let mut all: Vec<Candidate> = turnings(&numbers).iter().flat_map(|t| candidates(&numbers, t)).collect();
-    // What differs in nothing but the unit of lengths is told by the lengths themselves.
+    // A change of only the length unit is reported by the module `lengths`.
     all.retain(|c| Notation { unit: as_read.unit, ..c.notation } != as_read);
     let best = all.iter().map(|c| c.rms).fold(f64::INFINITY, f64::min);
     all.retain(|c| c.rms <= RIVAL * best);
