@@ -1,4 +1,4 @@
-"""In: the input of benches/calibration.rs. Out: times of OpenCV on it, in ms: CPU time of all threads and wall time.
+"""In: the input of benches/calibration.rs. Out: OpenCV's times for it, in ms: CPU time of all threads and wall time.
 
 Usage: SHEETLIGHT_REFERENCE=... python benches/peers/calibration.py   (needs opencv-python and numpy)
 """

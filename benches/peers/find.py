@@ -1,7 +1,7 @@
 """In: the pictures that benches/find.rs leaves in target/find-bench, and Criterion's times of Sheetlight on them.
-Out: how long OpenCV takes for the same search over the full turn: linemod's detector, matchTemplate on the pyramid level
-where Sheetlight's search starts with the same turns, and matchTemplate at full size (a few turns, scaled up).
-Unit: milliseconds, best of some runs; all of OpenCV's threads.
+Out: OpenCV's times for the same search over all rotations: the detector linemod; matchTemplate on the pyramid level where
+Sheetlight's search starts, with the same rotations; matchTemplate at full size (a few rotations, extrapolated to all).
+Unit: milliseconds, best of several runs, with all of OpenCV's threads.
 
     make bench-peers            (or: python find.py --cargo cargo)
 """
@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 ROOT = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "../.."))
-# Where cargo puts what it builds.
+# Cargo's target folder.
 TARGET = os.path.join(ROOT, os.environ.get("CARGO_TARGET_DIR", "target"))
 NAMES = ["picture 1280x1024", "height map 2000x2000"]
 
@@ -25,7 +25,7 @@ def best(work, runs):
 
 
 def turned(template, mask, angle_deg, fill):
-    """The template turned about its middle on a canvas that holds every turn; its mask with it."""
+    """The template and its mask, rotated about the centre on a canvas that is large enough for every rotation."""
     h, w = template.shape
     side = int(math.ceil(math.hypot(w, h)))
     m = cv2.getRotationMatrix2D(((w - 1) / 2, (h - 1) / 2), -angle_deg, 1.0)
@@ -60,8 +60,8 @@ def linemod(scene, template, mask, fill, step):
         t, m = (cv2.copyMakeBorder(i, 16, 16, 16, 16, cv2.BORDER_CONSTANT, value=f) for i, f in ((t, fill), (m, 0)))
         ident, _ = detector.addTemplate([cv2.cvtColor(t, cv2.COLOR_GRAY2BGR)], "part", m)
         added += int(ident >= 0)
-    # Its linear memories want sides that its strides (5, and 8 at half size) divide; rows of both sizes must be a multiple of
-    # 16 wide, or its aligned stores crash (opencv/opencv_contrib#4192).
+    # linemod needs sides that its strides (5, and 8 at half size) divide. The rows of both sizes must be a multiple of 16 px
+    # long, or its aligned stores crash (opencv/opencv_contrib#4192).
     h, w = -scene.shape[0] % 80, -scene.shape[1] % 160
     colour = cv2.cvtColor(cv2.copyMakeBorder(scene, 0, h, 0, w, cv2.BORDER_REPLICATE), cv2.COLOR_GRAY2BGR)
     ms, out = best(lambda: detector.match([colour], 75.0, ["part"]), 5)
@@ -74,7 +74,7 @@ def ours(cargo):
     for path in glob.glob(os.path.join(TARGET, "criterion/find/*/new/sample.json")):
         with open(path) as f, open(os.path.join(os.path.dirname(path), "benchmark.json")) as g:
             sample = json.load(f)
-            # The best run, as for OpenCV.
+            # Uses the best run, as for OpenCV.
             each = [t / n for t, n in zip(sample["times"], sample["iters"])]
             times[json.load(g)["function_id"]] = min(each) / 1e6
     return times
@@ -97,7 +97,7 @@ def main():
         mask = cv2.dilate(mask, np.ones((7, 7)))
         for what in sorted(k for k in times if k.startswith(name)):
             lines.append(f"{what:52} {times[what]:10.1f}")
-        # The turns of Sheetlight's coarse search: 1.6 px at the model's rim on the level where it starts.
+        # The rotations of Sheetlight's coarse search: steps of 1.6 px at the model's rim, on the level where the search starts.
         level = said["levels"] - 1
         count = math.ceil(2 * math.pi * max(said["radius"] / 2**level, 4.0) / 1.6)
         small = [cv2.resize(i, None, fx=0.5**level, fy=0.5**level, interpolation=cv2.INTER_AREA) for i in (scene, template, mask)]

@@ -1,10 +1,11 @@
-"""In: pictures made here. Out: how long OpenCV's chain, a column centroid, a Steger chain and Sheetlight take
-for the same pictures, in turns within one run, and whether Sheetlight's masks are OpenCV's, pixel for pixel, and its points
-those of OpenCV's lens and the plane.
-Unit: milliseconds a shot, medians over the rounds; ratios are medians of the rounds' ratios. "ours" ends with the same as
-OpenCV's chain, a point for the middle of every skeleton pixel; "full" is the chain of a scan, settings and result: a peak is
-fitted to each, with its standard deviation, and every reason against it is looked for; "host" is that on the processor. "by CPU" compares the CPU time of all threads, which says more than wall time on a machine
-that is busy with something else. "apart" is the largest distance of a point from OpenCV's ray and from the plane, in pixels.
+"""In: pictures made here. Out: times of OpenCV's chain, a column centroid, a Steger chain and Sheetlight for the same
+pictures, alternating within one run; whether Sheetlight's masks are equal to OpenCV's, pixel for pixel, and whether its
+points agree with OpenCV's lens and the plane.
+Unit: milliseconds a shot, medians over the rounds; ratios are medians of the rounds' ratios. "ours" has the same result as
+OpenCV's chain, a point for the centre of every skeleton pixel. "full" is the chain of a scan, with its settings and
+result: each such pixel gets a fitted peak with its standard deviation and all checks that can reject it. "host" is the same chain
+on the processor. "by CPU" compares the CPU time of all threads, which is more reliable than wall time on a busy machine.
+"apart" is the largest distance of a point from OpenCV's ray and from the plane, in pixels.
 
     make bench-peers            (or: python run.py --sheetlight target/release/sheetlight)
 """
@@ -16,12 +17,12 @@ import numpy as np
 SIZE, OFFSET = 31, 8
 LENS = np.array([-0.118, 0.086, 0.00062, -0.00041, -0.017])
 NORMAL, DISTANCE = np.array([0.0, 0.8, 0.6]), 90.0
-# Distance of points from OpenCV's, px.
+# Largest allowed distance of points from OpenCV's, px.
 APART = 1e-3
 
 
 def pictures(width, height, count, scene):
-    """Curved Gaussian stripe, shot and read noise, a few reflections."""
+    """Pictures of a curved Gaussian stripe with shot noise, read noise and a few reflections."""
     out = []
     x = np.arange(width)
     y = np.arange(height)[:, None]
@@ -45,7 +46,7 @@ def pictures(width, height, count, scene):
 
 
 def recorded(folder):
-    """The laser pictures of a recording, at most 32, spread over it."""
+    """At most 32 laser pictures of a recording, spread over it."""
     names = sorted(n for n in os.listdir(folder) if n.startswith("laser") and n.endswith(".png"))
     names = names[:: max(1, len(names) // 32)][:32]
     return [cv2.imread(os.path.join(folder, n), cv2.IMREAD_GRAYSCALE) for n in names]
@@ -56,7 +57,7 @@ def camera(width, height):
 
 
 def plane(rays):
-    """Rays to points on a fixed laser plane, mm."""
+    """Intersects rays with a fixed laser plane; points in mm."""
     return rays * (DISTANCE / (rays @ NORMAL))[:, None]
 
 
@@ -69,12 +70,12 @@ def opencv(image, k):
     return lit, thin, points
 
 
-# Thinning travels a pixel a sub-iteration: a lit tile with this much around it has the pixels of the whole picture.
+# Thinning propagates by one pixel per sub-iteration. A tile with a margin `AROUND` gives the same pixels as the whole picture.
 TILE, AROUND = 256, 32
 
 
 def opencv_tiles(image, k):
-    """The same with thinning only where tiles of 256 pixels are lit: OpenCV as it can be used, and not as it mostly is."""
+    """OpenCV's chain with thinning only in tiles of 256 pixels that contain light: faster than the usual use of OpenCV."""
     lit = cv2.adaptiveThreshold(image, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY, SIZE, -OFFSET)
     thin = np.zeros_like(lit)
     for y in range(0, lit.shape[0], TILE):
@@ -122,7 +123,7 @@ def centroid(image, least):
 
 @numba.njit(cache=True, parallel=True)
 def ridge(gx, gy, gxx, gxy, gyy, least):
-    """Steger 1998: sub-pixel zero of the derivative across the stripe."""
+    """Steger 1998: pixels that contain the zero of the derivative across the stripe."""
     height, width = gx.shape
     out = np.zeros((height, width), np.uint8)
     for y in numba.prange(1, height - 1):
@@ -168,7 +169,7 @@ class Sheetlight:
         setup = dict(width=width, height=height, count=len(images), shots_per_batch=batch, size=SIZE, offset=OFFSET,
                      pinhole=[k[0, 0], k[1, 1], k[0, 2], k[1, 2], 0.0], distortion=list(LENS),
                      normal=list(NORMAL), offset_mm=DISTANCE,
-                     # None: it learns the width.
+                     # None: Sheetlight learns the width.
                      width_px=width_px)
         self.pipe.stdin.write(json.dumps(setup).encode() + b"\n")
         for image in images:
@@ -186,7 +187,7 @@ class Sheetlight:
         return json.loads(self.pipe.stdout.readline())
 
     def points(self, i):
-        """x, y, X, Y, Z of every skeleton pixel, from left to right and from above."""
+        """x, y, X, Y, Z of every skeleton pixel, sorted by row from the top, then by column."""
         self.ask({"points": i})
         n = json.loads(self.pipe.stdout.readline())["points"]
         rows = np.frombuffer(self.pipe.stdout.read(20 * n), "<f4").reshape(n, 5).astype(float)
@@ -211,13 +212,13 @@ def clock(f, times=1):
 
 
 def points_apart(thin, ours, k):
-    """Largest distance of our points from OpenCV's viewing rays of the same pixels and from the plane, in pixels at their depth;
-    infinite where the pixels differ."""
+    """Largest distance of Sheetlight's points from OpenCV's viewing rays of the same pixels and from the plane, in pixels at
+    their depth; infinite if the pixels differ."""
     px = cv2.findNonZero(thin).reshape(-1, 2)
     px = px[np.lexsort((px[:, 0], px[:, 1]))]
     if len(px) != len(ours) or not np.array_equal(px, ours[:, :2]):
         return float("inf")
-    # To the end: five steps, its default, leave more than we ask for.
+    # Iterates to convergence: the default of five steps leaves a larger error than `APART`.
     end = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
     rays = cv2.undistortPointsIter(px.astype(np.float64).reshape(-1, 1, 2), k, LENS, np.eye(3), np.eye(3), end).reshape(-1, 2)
     points = ours[:, 2:]
@@ -230,7 +231,7 @@ def points_apart(thin, ours, k):
 def compare(program, width, height, scene, rounds, images=None):
     count = 32 if width * height < 5e5 else 8 if width * height < 5e6 else 2
     batch = 32 if width * height < 5e5 else 8 if width * height < 5e6 else 1
-    # A rendered stripe's width is known; of a recording's it is learned, as a scan learns it.
+    # The width of a rendered stripe is known. That of a recording is learned, as in a scan.
     width_px = None if images else 6.0 if scene == "thick" else 2.5
     images = images or pictures(width, height, count, scene)
     count = len(images)
@@ -253,7 +254,7 @@ def compare(program, width, height, scene, rounds, images=None):
         image = images[r % count]
         words = image.view(np.uint64).ravel()
         peers = [("opencv", lambda: opencv(image, k), 1), ("tiles", lambda: opencv_tiles(image, k), 1),
-                 # All pictures in turn: one alone would lie in the cache from the second time on.
+                 # All pictures in turn: a single one would be in the cache from the second run on.
                  ("threshold", lambda: [threshold_alone(i) for i in images], count),
                  ("centroid", lambda: [centroid(i, 40) for i in images], count)]
         for name, peer, shots in peers:

@@ -1,5 +1,5 @@
-"""In: the program, a simulated linear axis with the board that rides on it, a browser. Out: failure where the page Calibrate does not take an
-axis from its recording to the station, or where its gauge shows other stops than there are.
+"""In: the program, a simulated linear axis that carries a board, a browser. Out: failure if the page Calibrate cannot
+calibrate the axis from its recording and store it in the station, or if its gauge shows wrong stops.
 Frame and unit: counts, mm."""
 
 import json
@@ -16,7 +16,7 @@ program, folder = sys.argv[1:3]
 
 
 def widest(counts):
-    """Where the next stop tells most, as the gauge says it: a little before the middle of the widest gap."""
+    """The best next stop, computed as the gauge does: a little below the middle of the widest gap."""
     s = sorted(counts)
     gap, low = max((b - a, a) for a, b in zip(s, s[1:]))
     return low + 0.45 * gap

@@ -1,5 +1,5 @@
-"""In: the screen with a simulated recording of a board, whose poses are known; the browser that shows it. Out: failure where the page shows other
-corners than there are, or says that a board leaned otherwise than it did.
+"""In: the screen with a simulated recording of a board in known poses, and a browser that shows the screen. Out: failure
+if the page shows wrong corners or a wrong tilt of a board.
 Frame and unit: px, degrees."""
 
 import json
@@ -10,7 +10,7 @@ from shots import quiet
 
 
 def lean(pose):
-    """How far the side of the board that faces the camera looks to the right and downwards."""
+    """Tilt of the board: how far the side that faces the camera is turned to the right and down, degrees."""
     n = [pose[2], pose[6], pose[10]]
     side = -math.copysign(1, n[2])
     return [math.degrees(math.atan2(side * v, abs(n[2]))) for v in n[:2]]
@@ -27,7 +27,7 @@ def boards(s, b, folder, shot):
     b.page("calibrate")
     b.click("[data-target=camera]")
     b.until("all pictures", "return Number(document.querySelector('[data-views]')?.dataset.views) === arguments[0]", len(seen))
-    # Those without a board come into no gauge: the last of them may be shown after all that do.
+    # The gauges ignore pictures without a board, and the last of these may appear after the gauges are complete.
     b.until("every picture's corners", "return document.querySelectorAll('.thumb .over').length === arguments[0]", len(views))
     shown = b.run("return [...document.querySelectorAll('.thumb .over')].map((e) => e.querySelectorAll('circle').length)")
     assert shown == [len(v["corners"]) for v in views], shown
@@ -36,7 +36,7 @@ def boards(s, b, folder, shot):
     assert abs(covered - len(cells) / 48) < 1e-3, (covered, len(cells) / 48)
     assert b.run("return document.querySelectorAll('.gauges .next').length") == 2
     shot(b, "calibrate")
-    # A picture that is left out covers nothing.
+    # An excluded picture covers no cell.
     b.click(".thumb")
     b.until("one less", "return Number(document.querySelector('[data-views]')?.dataset.views) === arguments[0]", len(seen) - bool(views[0]["corners"]))
     print(f"boards: {len(seen)} of {len(truth)} pictures, {100 * covered:.0f} % covered, leans within {off:.2f} degrees of the truth")

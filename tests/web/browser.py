@@ -1,5 +1,5 @@
-"""In: chromedriver and chromium on this machine. Out: a browser that is driven as a person drives one: clicks, keys, what it
-shows, its pictures, its console. The WebDriver protocol over plain HTTP; nothing but Python's own library.
+"""In: chromedriver and chromium on this machine. Out: a browser that is used as a person uses one: clicks, keys, shown
+text, screenshots, console. It speaks the WebDriver protocol over plain HTTP with Python's standard library only.
 Frame and unit: CSS pixels, seconds."""
 
 import base64
@@ -27,7 +27,7 @@ STANDS = """
 
 
 class Browser:
-    """One chromium of 1280x800; `clicks` counts what an operator would have pressed."""
+    """A chromium with a page of 1280x800 CSS px; `clicks` counts the presses that an operator would have made."""
 
     @staticmethod
     def there():
@@ -35,7 +35,7 @@ class Browser:
 
     def __init__(self, folder, width=1280, height=800, flags=()):
         self.driver = subprocess.Popen(["chromedriver", "--port=0"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-        # It chooses a port that is free and says which.
+        # chromedriver chooses a free port and prints its number.
         port = next((m[1] for m in map(re.compile(r"success.* port (\d+)").search, self.driver.stdout) if m), None)
         assert port, "chromedriver does not say its port"
         self.root = f"http://127.0.0.1:{port}"
@@ -48,7 +48,7 @@ class Browser:
         ]
         wanted = {"alwaysMatch": {"browserName": "chrome", "goog:loggingPrefs": {"browser": "ALL"}, "goog:chromeOptions": {"args": arguments}}}
         self.session = "/session/" + self.ask("POST", "/session", {"capabilities": wanted})["sessionId"]
-        # The window's own frame is not the page's.
+        # Enlarges the window by its frame, so that the page has the wanted size.
         inner = self.run("return [innerWidth, innerHeight]")
         self.ask("POST", "/window/rect", {"width": 2 * width - inner[0], "height": 2 * height - inner[1]})
 
@@ -68,7 +68,7 @@ class Browser:
         return self.ask("POST", "/execute/sync", {"script": script, "args": list(args)})
 
     def until(self, what, script, *args, seconds=PATIENCE):
-        """Waits until a script gives something true, and gives it."""
+        """Waits until a script returns something true, and returns that."""
         try:
             return waits.until(what, lambda: self.run(script, *args), seconds)
         except AssertionError as e:
@@ -85,7 +85,7 @@ class Browser:
                 self.ask("POST", f"/element/{button}/click")
                 return True
             except AssertionError as e:
-                # The page drew itself anew between the look and the press: nothing was pressed.
+                # The page was redrawn between the search for the element and the press: nothing was pressed.
                 if not any(why in str(e) for why in ("stale element", "click intercepted", "reading 'getBoundingClientRect'")):
                     raise
 
@@ -93,12 +93,12 @@ class Browser:
         self.clicks += 1
 
     def page(self, name):
-        """Presses a page's name at the left and waits until it stands."""
+        """Presses a page's name at the left and waits until the page is shown."""
         self.click(f"#nav a[href='#/{name}']")
         self.ready(name)
 
     def ready(self, name):
-        # The bar is filled by the server's first word, by which the other pages are shown.
+        # The server's first message fills the bar, and the pages are drawn from it.
         self.until(f"page {name}", "return document.getElementById('main').dataset.ready === arguments[0] && document.querySelector('#bar .badge')?.textContent", name)
 
     def reload(self, name):
@@ -106,11 +106,11 @@ class Browser:
         self.ready(name)
 
     def place(self, css):
-        """Left, top, width and height of an element once it stays where it is from one picture of the page to the next."""
+        """Left, top, width and height of an element, once they are equal in two successive frames of the page."""
         return self.run(STANDS, css)
 
     def drag(self, css, a, b, hold=0.0):
-        """Presses at a, moves to b, lets go; shares of the element's width and height."""
+        """Presses at a, moves to b, releases; a and b in fractions of the element's width and height."""
         r = self.place(css)
         at = lambda p: {"x": round(r[0] + p[0] * r[2]), "y": round(r[1] + p[1] * r[3])}
         steps = [
@@ -123,7 +123,7 @@ class Browser:
         self.clicks += 1
 
     def hold(self, css):
-        """Presses and keeps pressing until `let_go`."""
+        """Presses the mouse button and holds it until `let_go`."""
         self.pressable(css)
         self.run("document.querySelector(arguments[0]).scrollIntoView({ block: 'center' })", css)
         left, top, width, height = self.place(css)
@@ -147,7 +147,7 @@ class Browser:
         return base64.b64decode(self.ask("GET", "/screenshot"))
 
     def console(self):
-        """What scripts complained of since it was asked last."""
+        """Messages in the console since the last call."""
         return [f"{e['level']}: {e['message']}" for e in self.ask("POST", "/se/log", {"type": "browser"}) if e["level"] in ("SEVERE", "WARNING")]
 
     def close(self):
@@ -159,7 +159,7 @@ class Browser:
 
 
 def levels(png, shades=48):
-    """A picture with fewer shades, so that its file stays small: PNG of 8 bits a channel in, the same out."""
+    """A PNG of 8 bits per channel with fewer levels, so that its file is small."""
     place, header, data = 8, None, b""
     while place < len(png):
         length, kind = struct.unpack(">I4s", png[place:place + 8])
@@ -184,7 +184,7 @@ def levels(png, shades=48):
         rgb = bytearray(3 * width)
         for c in range(3):
             rgb[c::3] = row[c::n].translate(table)
-        # Each byte less its left neighbour: areas become zeros.
+        # PNG filter Sub: each byte minus the same channel of its left neighbour. Uniform areas become zeros.
         less = bytearray(rgb[:3]) + bytearray((a - b) & 255 for a, b in zip(rgb[3:], rgb[:-3]))
         out += b"\x01" + less
     chunk = lambda kind, body: struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))

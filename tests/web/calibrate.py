@@ -1,5 +1,5 @@
-"""In: the program, a folder. Out: failure where an operator cannot calibrate the simulated cell from nothing to "good" through the real
-pages in a real browser. A third argument is a folder for the pages' pictures.
+"""In: the program, a folder, and optionally a folder for screenshots. Out: failure if an operator cannot calibrate the
+simulated cell from nothing to "good" with the real pages in a real browser.
 Frame and unit: mm, s of the cell."""
 
 import os
@@ -18,7 +18,7 @@ PAUSE, MOST_CLICKS, MOST_S = 2.0, 12, 300
 
 
 def ended(b):
-    """The calibration has ended, or it asks for nothing any more because something is wrong."""
+    """The end of the calibration: "good", or the text of the problem that stopped it; None while it runs."""
     return b.run("return document.querySelector('#main .problem')?.innerText ?? (document.querySelector('#accept') && 'good')")
 
 

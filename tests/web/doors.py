@@ -1,5 +1,5 @@
-"""In: the program, a simulated station. Out: failure where a request gets in that must not, where a viewer holds the server up,
-or where a killed server loses or invents a job.
+"""In: the program, a simulated station. Out: failure if the server accepts a request that it must refuse, if a viewer
+slows it down, or if a killed server loses or invents a job.
 Frame and unit: bytes, seconds, MB."""
 
 import json
@@ -111,7 +111,7 @@ def names(s, job):
 def bodies(s):
     refused("a body of 1 GB by its length", s.ask("POST", "/api/v1/jobs", b"{", Content_Length=str(1 << 30))[0])
     name, port = s.host.rsplit(":", 1)
-    # The same without saying so: in chunks, until the server has enough of it.
+    # The same body without a stated length: sent in chunks until the server refuses it.
     with socket.create_connection((name, int(port)), timeout=PATIENCE) as c:
         c.sendall(f"POST /api/v1/jobs HTTP/1.1\r\nHost: {s.host}\r\nAuthorization: Bearer {s.token}\r\nX-Sheetlight-Tab: tests\r\nTransfer-Encoding: chunked\r\n\r\n".encode())
         sent, answer = 0, b""
@@ -136,32 +136,32 @@ def bodies(s):
 
 
 def lease(s, cookie, found):
-    """Whoever does not operate orders nothing; motions of a robot are in motion.py."""
+    """Only the tab with the lease can order anything. motion.py tests the motions of a robot."""
     other = {"tab": "other"}
     s.json("POST", "/lease")
     refused("an order without the lease", s.ask("POST", "/api/v1/jobs", {"procedure": "check"}, **other)[0])
     refused("the lease while another has it", s.ask("POST", "/api/v1/lease", {}, **other)[0])
     refused("the same tab's name in another session", s.ask("POST", "/api/v1/jobs", {"procedure": "check"}, token=False, Cookie=cookie)[0])
     refused("a tab without a name", s.ask("POST", "/api/v1/lease", {"firmly": True}, tab=None)[0])
-    # There is no robot here: nothing is armed, nothing waits, nothing is confirmed.
+    # This station has no robot: nothing can be armed, no motion waits, and none can be confirmed.
     refused("arming where there is no robot", s.ask("POST", "/api/v1/robot", {"armed": True})[0])
     pose = {"job": found["id"], "hash": found["outcome"]["poses"]["hash"]}
     refused("motion without the lease", s.ask("POST", "/api/v1/motion/press", pose, **other)[0])
     refused("motion that nobody asks for", s.ask("POST", "/api/v1/motion/press", pose)[0])
     refused("motion that nobody confirmed", s.ask("POST", "/api/v1/motion/go", {"grant": "0" * 32, "what": pose})[0])
-    # Everybody may stop.
+    # Every tab may stop a job; this one is refused because the job does not run.
     refused("stopping what does not run", s.ask("POST", f"/api/v1/jobs/{found['id']}/stop", {}, **other)[0])
 
 
 def grown(data):
-    """Rows that a message of the growing map goes to, and rows in all."""
+    """Rows received with a message of the running scan's map, and all rows of the scan."""
     words = struct.unpack_from("<6I", data)
     return words[4] + words[5], words[3]
 
 
 def viewers(s):
-    """Fifty look on, one of them reads nothing: the scan goes on and memory stays."""
-    # A scan ran already: what it needs itself is in the peak before.
+    """Fifty viewers, one of which reads nothing, neither stop a scan nor use much memory."""
+    # A scan has run before, so that this peak already contains the memory of a scan.
     before, sockets = s.peak_mb(), []
     for _ in range(50):
         status, c = s.socket()
@@ -178,7 +178,7 @@ def viewers(s):
         if kind == 2:
             assert data[:4] == b"GROW"
             if rows == 0:
-                # One of them is killed while the scan runs: nothing is said, its connection is gone.
+                # A viewer is killed while the scan runs: its connection is reset without a WebSocket close message.
                 sockets[2].setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
                 sockets[2].close()
             rows, total = grown(data)
@@ -190,7 +190,7 @@ def viewers(s):
     took, more = time.time() - begun, s.peak_mb() - before
     print(f"50 viewers, one of which reads nothing: scan in {took:.1f} s, peak {more:.0f} MB above that of a scan alone")
     assert more <= 64, f"{more} MB"
-    # The bar and the last rows come in their own time, which may be after a short scan.
+    # The bar and the last rows may arrive after the end of a short scan.
     while "bar" not in seen or rows != total:
         kind, data = frame(sockets[1])
         seen |= {json.loads(data)["event"]} if kind == 1 else set()
@@ -201,14 +201,14 @@ def viewers(s):
 
 
 def begun(s, job, least):
-    """Waits until so much of a job is done, or all."""
+    """Waits until at least `least` units of a job are done, or until the job has ended."""
     now = lambda: s.json("GET", f"/jobs/{job}")
     until(f"{least} of {job}", lambda: (lambda j: j["done"] >= least or j["state"] not in ("queued", "running"))(now()))
 
 
 def killed_in(order, least, *behind):
-    """The server that was killed in the middle of a job, its next start, the job, those that waited behind it. One that ended before the
-    server did was not killed in its middle: another one is."""
+    """Kills a server in the middle of a job. Returns that server, its next start, the job, and the jobs queued behind it.
+    Tries again if the job ended before the server was killed."""
     for _ in range(10):
         s = Server(program, folder, "--recordings", folder)
         s.json("POST", "/lease")
@@ -223,7 +223,7 @@ def killed_in(order, least, *behind):
 
 
 def killed():
-    """Killed in a scan: the job is offered to be resumed, and comes to the same; a former start's token is no good."""
+    """A server killed in a scan: the job can be resumed and finishes; the token of the earlier start is refused."""
     s, again, job, second = killed_in({"procedure": "scan", "recording": "scan"}, 5, {"procedure": "check"})
     refused("the token of a former start", again.ask("GET", "/api/v1/bar", token=s.token)[0])
     cut = again.json("GET", f"/jobs/{job}")
@@ -231,7 +231,7 @@ def killed():
     assert again.json("GET", f"/jobs/{second}")["state"] == "cut_off"
     refused("a scan that is half done", again.ask("GET", f"/api/v1/scans/{job}/map")[0])
     assert any("cut off" in a for a in again.json("GET", "/bar")["alarms"])
-    # A second screen for the same station is refused, and says so.
+    # A second server for the same station refuses to start, and says why.
     try:
         Server(program, folder, "--recordings", folder)
         raise SystemExit("two screens for one station")
@@ -243,7 +243,7 @@ def killed():
     assert whole["state"] == "done", whole
     again.json("DELETE", f"/jobs/{second}")
     refused("a job that was taken away", again.ask("GET", f"/api/v1/jobs/{second}")[0])
-    # Ended while it works: the job is stopped and can go on.
+    # The server is ended while a job runs: the job is stopped and can be resumed.
     third = again.json("POST", "/jobs", {"procedure": "scan", "recording": longer(folder, 100)})["id"]
     begun(again, third, 5)
     assert again.end() == 0
@@ -253,7 +253,7 @@ def killed():
 
 
 def killed_in_a_calibration():
-    """What a killed calibration had found so far is not in the station; it is offered again, and accepted by a person alone."""
+    """A killed calibration stores nothing in the station. It can be resumed, and only a person accepts its result."""
     camera = os.path.join(folder, "station", "calibration", "camera.json")
     with open(camera, "rb") as f:
         before = f.read()
@@ -271,7 +271,7 @@ def killed_in_a_calibration():
 
 
 def starts():
-    """Folders that are no station, a port that is taken, a station that is broken, links that are not there: said, with what to do."""
+    """Start with no station in the folder, a used port, a broken station, or missing links: each is reported with a remedy."""
     run = lambda station, *more: subprocess.run([program, "station", "serve", "--station", station, "--port", "0", *more], capture_output=True, text=True, timeout=PATIENCE)
     empty = os.path.join(folder, "empty")
     os.makedirs(empty)
@@ -286,18 +286,18 @@ def starts():
     assert any("station.toml" in a for a in s.json("GET", "/bar")["alarms"]), s.json("GET", "/bar")
     assert "station.toml" in s.json("GET", "/station")["problem"]["what"]
     assert s.end() == 0
-    # The port is another program's: who has it, and the next free one.
+    # Another program uses the port: the server names that program and takes the next free port.
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
         s = Server(program, folder, "--port", str(port))
         assert port < int(s.host.rsplit(":", 1)[1]) <= port + 20, s.host
-        # What it says and its address come by two pipes.
+        # The message and the address arrive through two pipes, in any order.
         wanted = (f"port {port} is taken by python", f"(process {os.getpid()})")
         until("who has the port", lambda: all(w in "".join(s.said) for w in wanted))
         assert s.end() == 0
-    # Neither camera nor robot is there: the screen is, and says so.
+    # Without camera and robot the screen starts all the same, and shows two alarms.
     s = Server(program, folder, "--camera", "cell://127.0.0.1:1", "--robot", "bcap://127.0.0.1:1")
     until("both alarms", lambda: len(s.json("GET", "/bar")["alarms"]) >= 2)
     bar = s.json("GET", "/bar")

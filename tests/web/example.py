@@ -1,4 +1,5 @@
-"""In: the program, a simulated station, the example of docs/api.md. Out: failure where the example does not do what it says.
+"""In: the program, a simulated station, the example of docs/api.md. Out: failure if the example does not do what the
+document says.
 Frame and unit: mm."""
 
 import os

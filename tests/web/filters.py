@@ -1,5 +1,5 @@
-"""In: the screen with a finished scan, the browser that shows it. Out: failure where a filter changes what stays, cannot be undone, is lost on
-reload, or where the filtered scan is another one than the command line makes.
+"""In: the screen with a finished scan, and a browser that shows the screen. Out: failure if a filter changes the cells that
+remain, cannot be undone, or is lost on reload, or if the filtered scan differs from that of the command line.
 Frame and unit: mm, cells."""
 
 import array
@@ -11,7 +11,7 @@ from shots import quiet
 
 
 def heights(s, scan):
-    """Heights of a scan as it is looked at."""
+    """Heights of a scan with the current filters."""
     status, _, data = s.ask("GET", f"/api/v1/scans/{scan}/map/height")
     assert status == 200, status
     return array.array("f", data)
@@ -29,7 +29,7 @@ def filtered(program, s, b, shot):
     b.page("surface")
     b.until("the filters", "return document.querySelector('.sieve')?.dataset.left")
     assert left(b) == seen, (left(b), seen)
-    # A clean surface has no dust: whole blocks and holes' bottoms are islands here.
+    # The clean surface has no small islands, so that the limit is raised until blocks and bottoms of holes are islands.
     b.run("document.querySelector('.sieve input').value = 300")
     b.click("[data-filter=islands]")
     b.until("fewer cells", "return Number(document.querySelector('.sieve').dataset.left) < arguments[0]", seen)
@@ -55,7 +55,7 @@ def filtered(program, s, b, shot):
     assert sum(v == v for v in own) == without and all(n == w or n != n for n, w in zip(own, whole))
     first = s.json("GET", f"/jobs/{scan}")["outcome"]
     assert 100 < job["outcome"]["points"] < first["points"], (job["outcome"]["points"], first["points"])
-    # The same on the command line.
+    # The command line makes the same filtered scan.
     jobs = os.path.join(os.path.dirname(s.station), "station", "jobs")
     islands = job["order"]["filters"][0]
     out = os.path.join(os.path.dirname(s.station), "clean")
@@ -63,7 +63,7 @@ def filtered(program, s, b, shot):
     assert done.returncode == 0, done.stderr.decode()
     for name in ("height.tif", "cloud.ply"):
         assert filecmp.cmp(os.path.join(out, name), os.path.join(jobs, job["id"], "scan", name), shallow=False), name
-    # What leaves nothing is refused, and the former filters stay.
+    # Filters that would remove every cell are refused, and the previous filters stay.
     s.json("POST", "/lease", {"firmly": True})
     status, _, said = s.ask("PUT", f"/api/v1/scans/{scan}/filters", {"filters": [{"filter": "heights", "low_mm": 1e6, "high_mm": 2e6}]})
     assert status == 409 and b"no cell is left" in said, (status, said)
@@ -73,7 +73,7 @@ def filtered(program, s, b, shot):
     s.json("PUT", f"/scans/{scan}/filters", {"filters": []})
     s.json("POST", "/lease/release")
     assert sum(v == v for v in heights(s, scan)) == seen
-    # The pages that follow go on with the scan as it was measured.
+    # The tests that follow use the unfiltered scan.
     s.json("POST", "/lease")
     s.json("DELETE", f"/jobs/{job['id']}")
     s.json("POST", "/lease/release")

@@ -1,5 +1,5 @@
-"""In: the screen over a simulated cell whose job has found a part, the browser that shows it. Out: failure where the part's outlines lie
-beside what the camera's picture shows, or the page or the command line draws something else.
+"""In: the screen of a simulated cell whose job has found a part, and a browser that shows the screen. Out: failure if the
+part's outlines do not lie on the part in the camera's picture, or if page and command line draw different outlines.
 Frame and unit: px, grey levels."""
 
 import json
@@ -9,12 +9,12 @@ import subprocess
 
 import waits
 
-# Outlines that are moved aside by so much lie on fewer edges, px.
+# Shift of the outlines for comparison, px: shifted outlines lie on fewer edges.
 ASIDE = 6
 
 
 def picture(s):
-    """The camera's newest picture: number, columns, rows, levels."""
+    """The camera's newest picture: number, columns, rows, grey levels."""
     status, _, b = s.ask("GET", "/api/v1/camera/newest?after=0")
     assert status == 200, status
     number, columns, rows, peaks = struct.unpack("<4I", b[:16])
@@ -22,7 +22,7 @@ def picture(s):
 
 
 def steep(lines, columns, rows, grey, du=0, dv=0):
-    """How much the picture changes across the lines, on average; None where too little of them lies in it."""
+    """Mean change of the grey level across the lines; None if at most 200 sampled points lie in the picture."""
     total, n = 0.0, 0
     for line in lines:
         for (u, v), (x, y) in zip(line, line[1:]):
@@ -41,12 +41,13 @@ def steep(lines, columns, rows, grey, du=0, dv=0):
 
 
 def lies_on_the_part(s, b):
-    """Before the arm goes above the part: the page draws its outlines over the picture, on the edges that the picture shows."""
+    """Before the approach, the page draws the part's outlines over the picture, and they lie on the picture's edges."""
     job = s.json("GET", "/motion")["asked"]["job"]
     b.until("the part over the picture", "return Number(document.querySelector('canvas.live')?.dataset.ghost) > 0")
 
     def both():
-        """The same picture at the page and here, and the part in it: newer pictures come at any time, poses a moment after them."""
+        """The outlines and the picture, if the page shows the same picture; else None. New pictures arrive at any time, and
+        their poses a moment later."""
         number, columns, rows, grey = picture(s)
         status, _, said = s.ask("GET", f"/api/v1/jobs/{job}/ghost?number={number}")
         ghost = json.loads(said)
@@ -65,7 +66,7 @@ def lies_on_the_part(s, b):
 
 
 def as_on_the_command_line(program, folder, job):
-    """`sheetlight ghost` draws the same part into a picture of the job's own scan."""
+    """`sheetlight ghost` draws the same part into a picture of the job's scan."""
     own = os.path.join(folder, "jobs", job)
     done = subprocess.run([program, "--json", "ghost", os.path.join(own, "insertion", "found.json"), "--recipe", os.path.join(own, "recipe.toml"),
         "--recording", os.path.join(own, "insertion", "line"), "--station", folder, "--out", os.path.join(folder, "ghost.png")], capture_output=True)

@@ -1,5 +1,5 @@
-"""In: the program, a simulated station, browsers. Out: failure where an old browser without WebGL2 shows nothing in the place of three
-dimensions, or where a full disk is not named on the page where it happens, with what to do.
+"""In: the program, a simulated station, browsers. Out: failure if an old browser without WebGL2 shows nothing in place of
+the 3-D view, or if a page does not report a full disk together with a remedy.
 Frame and unit: none."""
 
 import sys
@@ -11,12 +11,12 @@ from server import Server
 from shots import quiet
 
 program, folder = sys.argv[1:3]
-# File operations after which the disk is full: a start takes fewer, a scan more.
+# File operations after which the disk is full. A start needs fewer, a scan more.
 ROOM = 24
 
 
 def old_browser(url, scanned):
-    """Neither WebGL nor WebGL2: the map stays, and the page says why."""
+    """Without WebGL and WebGL2 the page says that there is no 3-D view, and the map still works."""
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         b = Browser(profile, flags=("--disable-3d-apis",))
         try:
@@ -31,7 +31,7 @@ def old_browser(url, scanned):
                 b.until("that there is no WebGL2", "return /no WebGL2/.test(document.getElementById('main').innerText)")
             b.page("surface")
             b.until("the map again", "return document.querySelector('.map canvas')?.width > 300")
-            # What a browser without it says of that by itself is none of the page's.
+            # The browser's own messages about missing WebGL are not faults of the page.
             said = [m for m in b.console() if "WebGL" not in m and "GPU" not in m]
             assert not said, said
         finally:
@@ -39,7 +39,7 @@ def old_browser(url, scanned):
 
 
 def full_disk():
-    """The disk is full while a scan writes: the page Scan names it in the operator's words."""
+    """If the disk is full while a scan writes, the page Scan reports it in words that an operator understands."""
     s = Server(program, folder, "--recordings", folder, env={"SHEETLIGHT_FULL_AT": str(ROOM)})
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         b = Browser(profile)

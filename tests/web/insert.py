@@ -1,6 +1,6 @@
-"""In: the program, a folder, parts. Out: failure where an operator cannot insert each of them in the simulated cell through the real
-pages in a real browser, judged by the cell's truth. Clicks and the cell's time are counted. A fourth argument is the cell's speed, a
-fifth the sweep (0: the program's own), a sixth a folder for the pages' pictures.
+"""In: the program, a folder, names of parts, the cell's speed, the sweep's length (0: the program's choice), and optionally a
+folder for screenshots. Out: failure if an operator cannot insert each part in the simulated cell with the real pages in
+a real browser. The cell's ground truth decides; clicks and the cell's time are counted.
 Frame and unit: mm, s of the cell."""
 
 import os
@@ -19,10 +19,10 @@ from shots import quiet, shot
 
 program, folder, parts, speed, sweep = sys.argv[1:6]
 pictures = sys.argv[6] if len(sys.argv) > 6 else None
-# At the cell's own pace an operator takes his time over each click.
+# Pause before a click, s: at the cell's real speed the test clicks as slowly as an operator.
 PAUSE = 2.0 if float(speed) == 1 else 0.2
 PATIENCE = 600
-# Notes the longest time between two pulses of the page while the button is down.
+# Records the longest time between two messages of the page while the button is held.
 PULSES = """
   window.silent = 0;
   let last = 0;
@@ -35,12 +35,12 @@ PULSES = """
   };
   addEventListener('pointerup', () => (last = 0), true);"""
 SILENT = "return Math.round(window.silent)"
-# Notes the longest that the page was kept from its work.
+# Records the longest delay of a timer in the page.
 KEPT = """
   window.kept = 0;
   let due = performance.now() + 50;
   setInterval(() => { const now = performance.now(); window.kept = Math.max(window.kept, now - due); due = now + 50; }, 50);"""
-# What a page would say that takes the held button for a new press; beside the pulses, which go on.
+# The request of a page that mistakes the held button for a new press. The messages of the held button continue.
 PRESS = """
   const tab = { 'X-Sheetlight-Tab': sessionStorage.tab };
   return fetch('/api/v1/motion').then((m) => m.json()).then(({ asked: { job, hash } }) =>
@@ -49,14 +49,14 @@ METER = stalls.Meter()
 
 
 def stalled(b, why):
-    """A button that was held, and not heard for a second because the machine stood still, judges nothing."""
+    """Discards the trial if the held button's lease ran out because the machine stalled."""
     longest = max(METER.longest, b.run("return window.kept") / 1000)
     if longest > stalls.LONG and "lease ran out" in why:
         raise stalls.Stalled(f"the machine stood still for {longest:.2f} s: {why}")
 
 
 def step(b, *names):
-    """Waits until a motion of one of these names is asked for, or the job ended otherwise."""
+    """Waits until one of these motions is proposed; fails if the job ends otherwise."""
     script = """
       const ask = document.querySelector('.ask'), problem = document.querySelector('#main .problem')?.innerText;
       if (problem) return 'problem: ' + problem;
@@ -70,7 +70,8 @@ def step(b, *names):
 
 
 def held(s, b, *names):
-    """Holds the button until one of these is asked for; gives the longest that the server heard nothing of it, ms."""
+    """Holds the button until one of these motions is proposed. Returns the server's longest time without a report of the
+    button, ms."""
     time.sleep(PAUSE)
     METER.clear()
     b.run("window.kept = 0")
@@ -78,7 +79,7 @@ def held(s, b, *names):
     try:
         step(b, *names)
         if names == ("approach",):
-            # Still down from what only looked: at the part the button is pressed anew, whatever a page says.
+            # The button is still held from the scan. A motion at the part needs a new press, whatever the page requests.
             said = b.run(PRESS)
             if said[0] == 200:
                 stalled(b, "the held button's lease ran out")
@@ -89,13 +90,13 @@ def held(s, b, *names):
 
 
 def log():
-    """What happened since the arm was jogged over the part."""
+    """Events since the arm was jogged over the part."""
     all_ = events(folder)
     return all_[max(k for k, e in enumerate(all_) if e["what"] == "jogged"):]
 
 
 def legs(s):
-    """Of the motion that waits."""
+    """Number of single motions in the motion that waits for confirmation."""
     return s.json("GET", "/motion")["asked"]["motions"]
 
 
@@ -128,7 +129,7 @@ def insert(s, b, part):
     up = legs(s)
     silence.append(held(s, b, "inserted"))
     clicks = b.clicks
-    # The cell writes its log in its own time: all of it is there when the arm is back up.
+    # The cell writes its log asynchronously. The log is complete when it contains the retraction.
     arrivals = lambda part: [e["t_s"] for e in part if e["what"] == "arrived"]
     let_go = lambda: next((k for k, e in enumerate(log()) if e["what"] == "released"), None)
     waits.until("the log to its end", lambda: let_go() and len(arrivals(log()[let_go():])) >= up)
@@ -154,19 +155,20 @@ def insert(s, b, part):
         b.until("what was found", "return document.querySelector('.found-pose')")
         shot(b, pictures, "inserted")
     given_back(s)
-    # The part is drawn where the arm is known to stand: a controller that was not heard for a second is told, and refused.
+    # The part is drawn only at a known pose of the arm. If the controller was silent for a second, the request for the
+    # outlines is refused; such refusals are ignored here.
     quiet(b, part, refused=1, aside="/ghost?")
 
 
 def given_back(s):
-    """The next one begins as the first did."""
+    """Disarms the robot and releases the lease, so that the next insertion begins as the first did."""
     s.json("POST", "/lease", {"firmly": True})
     s.json("POST", "/robot", {"armed": False})
     s.json("POST", "/lease/release")
 
 
 def taken_away(s, b):
-    """The job that was halted is no more, and somebody has looked at the arm."""
+    """Deletes the halted job, and confirms that somebody has looked at the arm."""
     job = s.json("GET", "/jobs")[0]["id"]
     s.ended(job)
     s.json("POST", "/lease", {"firmly": True})

@@ -1,5 +1,5 @@
-"""In: the program, a simulated station, its scan's pictures as raw frames on standard input at 25 a second. Out: failure where the
-newest picture is not shown with its peaks, where one that was passed over is not counted, or where two that look on slow it down.
+"""In: the program, a simulated station, its scan's pictures as raw frames on standard input at 25 a second. Out: failure
+if the newest picture is not shown with its peaks, if a skipped picture is not counted, or if two viewers slow the server.
 Frame and unit: px, ms, pictures a second."""
 
 import glob
@@ -17,7 +17,7 @@ from waits import PATIENCE, until
 
 program, folder = sys.argv[1:3]
 RATE, SECONDS = 25, 4
-# So many pictures are shown to each that looks on, however slow the machine is.
+# Least number of pictures that each viewer gets, also on a slow machine.
 LEAST = 11
 
 
@@ -44,7 +44,7 @@ seen, fed = {0: [], 1: []}, threading.Event()
 
 
 def look(who):
-    """What a page does: the newest one after the one that it shows."""
+    """Does what a page does: asks for a newer picture than the one it shows."""
     number = 0
     while not fed.is_set():
         status, _, b = s.ask("GET", f"/api/v1/camera/newest?after={number}", tab=f"look{who}")
@@ -60,7 +60,7 @@ def look(who):
 
 
 def accounted(bar):
-    """Every picture was measured or is counted; one may be under way."""
+    """Every picture is counted as measured or dropped; one may still be in progress."""
     count = bar["frames"]
     return abs(count["measured"] + sum(count["dropped"].values()) - count["seen"]) <= 1
 
@@ -68,30 +68,31 @@ def accounted(bar):
 threads = [threading.Thread(target=feed), *(threading.Thread(target=look, args=(k,)) for k in seen)]
 [t.start() for t in threads]
 [t.join() for t in threads]
-# Its end comes after all pictures that were sent, and the account of them with it.
+# The camera's end is reported after all sent pictures, together with their counts.
 bar = until("the camera's end", lambda: (lambda bar: bar if any("ended" in a for a in bar["alarms"]) and accounted(bar) else None)(s.json("GET", "/bar")))
 assert bar["mode"] == "live", bar
 count = bar["frames"]
 for who in seen:
     numbers = [n for n, _, _ in seen[who]]
     assert len(numbers) >= LEAST and numbers == sorted(set(numbers)), f"{who}: {len(numbers)} pictures, newest first"
-    # The first pictures show the stage what the stripe is like.
+    # The stage learns the stripe from the first pictures.
     assert all(p > 100 for _, p, _ in seen[who][3:]), [p for _, p, _ in seen[who]]
 over = count["dropped"].get("skipped: a newer one came", 0)
 assert count["seen"] == sent, (count, sent)
 print(f"{sent} pictures at {RATE}/s to two that look on: {[len(seen[k]) for k in seen]} shown, {over} passed over, delay p50/p99 {bar['delay_ms']} ms")
 s.end()
 
-# A job comes first: while it runs what nobody looks at is not measured, and counted; who asks gets a fresh picture all the same.
+# A job has priority: while it runs, pictures that nobody requests are not measured, but counted. A viewer that asks still
+# gets a new picture.
 s = Server(program, folder, "--recordings", folder, "--camera", "sim:3?rate=8")
 unlooked = lambda: s.json("GET", "/bar")["frames"]["dropped"].get("nobody looked while a job ran", 0)
 until("pictures", lambda: s.json("GET", "/bar")["frames"]["measured"] >= 3)
 assert unlooked() == 0, "a picture was left out while no job ran"
 s.json("POST", "/lease")
-# Long enough for some of the camera's pictures, however they come.
+# Long enough that some pictures of the camera arrive during the scan.
 scan = {"procedure": "scan", "recording": longer(folder, 4)}
 assert s.job(scan)["state"] == "done"
-# The next one is looked at while it runs.
+# A viewer requests pictures during the next scan.
 before = unlooked()
 assert before > 0, s.json("GET", "/bar")["frames"]
 job = s.json("POST", "/jobs", scan)["id"]

@@ -1,6 +1,6 @@
-"""In: the program, a folder with a simulated station and its scan. Out: the numbers of a cloud of a million points in three dimensions,
-printed: the first view, how fast it turns and with how many points. Failure where the screen does not say how many of how many it draws,
-where it never draws all of them, or where the point that is picked is not one of the cloud's.
+"""In: the program, a folder with a simulated station and its scan. Out: printed figures of the 3-D view of a million points:
+time to the first view, frame rate of a rotation and its number of points. Failure if the screen does not state how many
+points it draws of how many, if it never draws all, or if a picked point is not in the cloud.
 Frame and unit: mm, s, pictures a second."""
 
 import os
@@ -19,7 +19,7 @@ MILLION = 1_000_000
 
 
 def grown(path):
-    """The scan's points again and again beside themselves, until there are a million; bytes of a binary PLY of one element."""
+    """Repeats the points of a binary PLY with one element, slightly shifted, until there are a million. Returns their number."""
     with open(path, "rb") as f:
         data = f.read()
     at = data.index(b"end_header\n") + 11
@@ -33,7 +33,7 @@ def grown(path):
     body = bytearray(data[at:] * times)
     for k in range(1, times):
         for i in range(k * n, (k + 1) * n):
-            # A hair beside the original: other points, the same part.
+            # Shifted by 3 µm per copy: different points, the same part.
             x, = struct.unpack_from("<f", body, i * size)
             struct.pack_into("<f", body, i * size, x + 0.003 * k)
     with open(path, "wb") as f:
@@ -42,14 +42,14 @@ def grown(path):
 
 
 def turns(b, seconds):
-    """Drags over the cloud for so long; pictures a second, and how many points each of them had."""
+    """Rotates the cloud for `seconds`; returns frames a second and the number of points in each frame."""
     b.run("""
       window.drawn = [];
       new MutationObserver(() => window.drawn.push([performance.now(), Number(document.querySelector('[data-shown]').dataset.shown)]))
         .observe(document.querySelector('[data-shown]'), { attributes: true, attributeFilter: ['data-shown', 'data-drawn'] });""")
     x, y, w, h = b.run("const r = document.querySelector('[data-shown] canvas').getBoundingClientRect(); return [r.left, r.top, r.width, r.height]")
     b.mouse({"type": "pointerMove", "duration": 0, "x": round(x + 0.5 * w), "y": round(y + 0.5 * h)}, {"type": "pointerDown", "button": 0})
-    # WebDriver's own moves come too seldom: one before each picture, as a mouse does.
+    # WebDriver sends too few moves. The script sends one before each frame, as a mouse does.
     b.run("""
       const canvas = document.querySelector('[data-shown] canvas'), end = performance.now() + 1000 * arguments[0], [x, y] = [arguments[1], arguments[2]];
       window.turning = true;
@@ -63,7 +63,7 @@ def turns(b, seconds):
     b.until("the end of the turn", "return !window.turning")
     b.let_go()
     drawn = b.run("return window.drawn")
-    # The first second it learns how many points this machine turns.
+    # In the first second the page adapts the number of points to this machine.
     drawn = [d for d in drawn if d[0] > drawn[0][0] + 1000]
     return (len(drawn) - 1) / (drawn[-1][0] - drawn[0][0]) * 1000, [n for _, n in drawn]
 
@@ -86,7 +86,7 @@ def main():
             both = lambda: b.run("const e = document.querySelector('[data-shown]'); return [Number(e.dataset.shown), e.querySelector('.read').innerText]")
 
             def said():
-                """What is drawn, and of how many, as the screen says; it is what was drawn."""
+                """The numbers of drawn points and of all points, as the screen states them; checked against the drawn frame."""
                 drawn, words = both()
                 said = [int(re.sub(r"\D", "", x)) for x in re.match(r"([\d\s]+) of ([\d\s]+) points", words).groups()]
                 assert said == [drawn, all_], (words, drawn, all_)

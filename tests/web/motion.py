@@ -1,6 +1,7 @@
-"""In: the program, two folders. Out: failure where the robot of a simulated cell moves that must not: without lease, for another motion than
-the one shown, twice, too early, from another tab, with a former start's token; where letting go, going away, silence, another operator or
-STOP do not halt it; where a killed server says that something is done that is not.
+"""In: the program, two folders. Out: failure if the robot of a simulated cell moves when it must not: without the lease, for
+another motion than the one shown, twice, too early, from another tab, or with the token of an earlier start. Failure if
+releasing the button, closing the page, silence, another operator or STOP does not halt the robot, or if a killed server
+reports something as done that is not.
 Frame and unit: s."""
 
 import contextlib
@@ -28,13 +29,13 @@ def refused(what, answer):
 
 
 def count(what, where=folder):
-    """In the cell's log, which is written a little after what happens."""
+    """Number of such events in the cell's log, which is written shortly after the event."""
     time.sleep(0.2)
     return sum(e["what"] == what for e in events(where))
 
 
 def motions(what):
-    """In the station's log, which is written before a job goes on."""
+    """Number of such events in the station's log, which is written before a job continues."""
     with open(os.path.join(folder, "station", "motions.jsonl")) as f:
         return sum(json.loads(line)["event"] == what for line in f)
 
@@ -45,13 +46,13 @@ def why(ended):
 
 
 class Late(AssertionError):
-    """A limit of time was not kept."""
+    """A time limit was exceeded."""
 
 
 @contextlib.contextmanager
 def judged(ended):
-    """What has to come within a second is judged where the machine did not stand still meanwhile; what else is wrong, always. `ended` gives
-    why the job ended."""
+    """Discards a trial as `Stalled` if a time limit was exceeded while the machine stalled; every other failure counts.
+    `ended` returns why the job ended."""
     METER.clear()
     try:
         yield
@@ -62,7 +63,7 @@ def judged(ended):
 
 
 class Operator:
-    """A tab with its socket: what a page does."""
+    """A tab with its socket, which acts as a page does."""
 
     def __init__(self, s, tab="tests", session=None):
         self.s, self.tab = s, tab
@@ -90,7 +91,7 @@ class Operator:
         return until(step, waits)
 
     def begin(self):
-        """Arms, looks, orders; gives the job that now asks for its first motion."""
+        """Arms the robot, confirms the look at it, and orders a job. Returns the job, which then proposes its first motion."""
         self.s.json("POST", "/lease", {"firmly": True}, tab=self.tab)
         self.s.json("POST", "/robot", {"armed": True}, tab=self.tab)
         self.s.json("POST", "/robot/looked", tab=self.tab)
@@ -102,7 +103,7 @@ class Operator:
         return json.loads(body)["grant"]
 
     def go(self, what):
-        """Presses, holds, confirms; from then on the caller says that it is held."""
+        """Presses, holds and confirms. From then on the caller must report that the button is held."""
         grant = self.press(what)
         time.sleep(HELD)
         status, _, body = self.post("/motion/go", {"grant": grant, "what": what})
@@ -111,7 +112,7 @@ class Operator:
 
     @contextlib.contextmanager
     def holding(self, grant):
-        """The button stays down while something else is asked, which may take longer than the button may be silent."""
+        """Reports the held button while other requests run, which may take longer than the button may be silent."""
         over = threading.Event()
 
         def talk():
@@ -128,7 +129,7 @@ class Operator:
             say(self.socket, f"held {grant}")
 
     def moves(self, job, grant, where=folder):
-        """Holds until the arm is under way."""
+        """Holds the button until the arm moves."""
         with self.holding(grant):
             until("that it moves", lambda: moving(where) or self.s.json("GET", f"/jobs/{job}")["state"] != "running")
         job = self.s.json("GET", f"/jobs/{job}")
@@ -136,14 +137,14 @@ class Operator:
 
 
 def moving(where):
-    """The arm is under way now."""
+    """Whether the arm moves now."""
     log = events(where)
     last = [e["what"] for e in log if e["what"] in ("move", "arrived", "halt")]
     return bool(last) and last[-1] == "move"
 
 
 def nothing_moves(s, former):
-    """Every way to a motion that is none. The controller's log stays empty of moves."""
+    """Tries every forbidden way to start a motion. The controller's log must contain no move."""
     a, b = Operator(s), Operator(s, "other")
     refused("a job before arming", s.ask("POST", "/api/v1/robot", {"armed": True}, tab="other"))
     s.json("POST", "/lease", {"firmly": True})
@@ -154,7 +155,7 @@ def nothing_moves(s, former):
     refused("press without the lease", b.post("/motion/press", what))
     refused("press for another motion", a.post("/motion/press", {**what, "hash": "0" * 64}))
     refused("press for another job", a.post("/motion/press", {**what, "job": "0099-insert"}))
-    # All else is as it has to be: only who asks is wrong.
+    # The requests are correct except for the sender.
     grant = a.press(what)
     time.sleep(HELD)
     for why, other in (("a former start's token", {"token": former}), ("a token that is none", {"token": "0" * 32}), ("no token", {"token": False}), ("a page of another origin", {"Origin": "http://evil.example"}), ("another host's name", {"host": "evil.example"})):
@@ -173,14 +174,14 @@ def nothing_moves(s, former):
     refused("go without the lease", b.post("/motion/go", {"grant": grant, "what": what}))
     a.post("/motion/release")
     refused("go after it was let go", a.post("/motion/go", {"grant": grant, "what": what}))
-    # Who gives the lease back operates no more, although nobody else does and the arm is his still.
+    # A tab that released the lease cannot operate, although no other tab holds the lease and the tab still has the arm.
     assert a.post("/lease/release")[0] == 200
     refused("press after the lease was given back", a.post("/motion/press", what))
     refused("confirming after the lease was given back", a.post("/motion/refuse", what))
     s.json("POST", "/lease", {})
     refused("press of what was armed under a former lease", a.post("/motion/press", what))
     a.post("/robot", {"armed": True})
-    # A tab whose name begins like the operator's is another one.
+    # A tab whose name begins like the operator's is a different tab.
     grant = a.press(what)
     time.sleep(HELD)
     s.json("POST", "/lease", {"firmly": True}, tab="tests2")
@@ -197,18 +198,18 @@ def nothing_moves(s, former):
     refused("press after somebody else operated, unarmed", a.post("/motion/press", what))
     refused("jogging while a job has the arm", a.post("/simulated", {"holds": "osc"}))
     refused("giving back while a job has the arm", a.post("/robot", {"armed": False}))
-    # No: the job ends, and nothing moved.
+    # The operator refuses the motion: the job ends, and nothing has moved.
     a.post("/robot", {"armed": True})
     assert a.post("/motion/refuse", what)[0] == 200
     ended = s.ended(job)
-    # It stands where it stood: resumed it would measure anew.
+    # The arm has not moved; a resumed job would measure again.
     assert ended["state"] == "failed" and ended["resumable"], ended
     refused("press of a motion of a job that has ended", a.post("/motion/press", what))
     assert count("move") == 0, "something moved"
 
 
 def halts(s):
-    """Whatever ends the hold halts; the job says why, and the next motion wants somebody to look."""
+    """Each way to end the hold halts the arm. The job states why, and the next motion requires that somebody looks first."""
     a, watcher = Operator(s), Operator(s, "watcher")
 
     def let_go(grant):
@@ -218,7 +219,7 @@ def halts(s):
         pass
 
     def not_mine(grant):
-        # Another tab that knows the name, and the holder under a name that is none, hold nothing.
+        # Neither another tab with the right grant nor the holder with a wrong grant keeps the button held.
         def talk(mine=a.socket):
             with contextlib.suppress(OSError):
                 for _ in range(40):
@@ -228,7 +229,7 @@ def halts(s):
         threading.Thread(target=talk, daemon=True).start()
 
     def gone(grant):
-        # A socket that is closed while its listener waits in it says nothing to the server until the next event comes.
+        # Without the shutdown the server would notice nothing until the next event, because the listener waits in the socket.
         a.socket.shutdown(socket.SHUT_RDWR)
         a.socket.close()
 
@@ -264,7 +265,7 @@ def halts(s):
             assert ended["state"] in ("failed", "stopped") and wanted in why(ended), (how.__name__, ended["problem"])
             assert ended["outcome"] is None and ended["resumable"], ended
             m = s.json("GET", "/motion")
-            # Who goes silent is not heard for a second, and a little until that is seen and the arm stands.
+            # After silence, the measured time is one second plus the time until the server notices it and the arm stands.
             assert (1000 if wanted == RAN_OUT else 0) < m["silence_ms"], (how.__name__, m["silence_ms"])
             if took >= 5 or m["silence_ms"] >= 2500:
                 raise Late(f"{how.__name__}: halted after {took:.2f} s, not heard for {m['silence_ms']:.0f} ms")
@@ -276,14 +277,14 @@ def halts(s):
 
     for how, wanted in ((let_go, "let go"), (silence, RAN_OUT), (not_mine, RAN_OUT), (gone, "gone"), (taken_over, "took over"), (stop, "STOP"), (end_job, "STOP")):
         ended = stalls.again(how.__name__, lambda: trial(how, wanted))
-    # Nobody has looked: the next motion is refused although it is armed and held.
+    # Nobody has looked at the robot: the next job fails although the robot is armed.
     s.json("POST", "/lease", {"firmly": True})
     s.json("POST", "/robot", {"armed": True})
     moves, begun = count("move"), motions("begun")
     job = s.json("POST", "/jobs", {"procedure": "insert", "recipe": "osc"})["id"]
     assert s.ended(job)["state"] == "failed"
     assert count("move") == moves
-    # The halted one is offered: it backs out, and says that nothing was inserted.
+    # The halted job can back out; it then reports that nothing was inserted.
     s.json("POST", "/robot/looked")
     s.json("POST", f"/jobs/{ended['id']}/back_out")
     ended = s.ended(ended["id"])
@@ -293,7 +294,8 @@ def halts(s):
 
 
 def killed(former):
-    """Server and cell are two programs; the server is killed in a motion. The next start offers the job; nothing half done is done."""
+    """Server and cell are two programs; the server is killed during a motion. The next start offers the job to be resumed, and
+    reports nothing unfinished as done."""
     os.makedirs(second, exist_ok=True)
     log = os.path.join(second, "cell.jsonl")
     cell = subprocess.Popen([program, "--json", "cell", "simulate", "--part", "osc", "--seed", "3", "--robot-port", "0", "--camera-port", "0", "--station", os.path.join(second, "station"), "--log", log], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
@@ -305,7 +307,7 @@ def killed(former):
         toml = os.path.join(second, "station", "station.toml")
         with open(toml) as f:
             settings = f.read()
-        # Two busy cores may keep the link's threads waiting.
+        # On two busy cores the threads of the link may be late, so that these limits are longer here.
         with open(toml, "w") as f:
             f.write(settings.replace("max_silence_ms = 400.0", "max_silence_ms = 3000.0").replace("max_still_ms = 300.0", "max_still_ms = 3000.0"))
         more = ("--recordings", second, "--robot", uris["robot"], "--camera", uris["camera"])
@@ -315,7 +317,7 @@ def killed(former):
         s.end()
 
         def trial():
-            """A server that is killed while the arm is under way; the next start."""
+            """Kills a server while the arm moves, and starts the next one."""
             at = s = Server(program, second, *more, "--allow-motion")
             a = Operator(s)
             job = a.begin()

@@ -1,4 +1,4 @@
-"""Calibrates a camera that stands still through the API, and compares it with what the command line makes of the same pictures."""
+"""Calibrates a stationary camera through the API, and compares the result with that of the command line."""
 
 import json
 import math
@@ -15,16 +15,17 @@ calibration = os.path.join(station, "calibration")
 
 
 def inverse(m):
-    """Of a rigid transform, 16 numbers row by row."""
+    """Inverse of a rigid transform, 16 numbers row by row."""
     turn = [[m[4 * j + i] for j in range(3)] for i in range(3)]
     shift = [-sum(turn[i][j] * m[4 * j + 3] for j in range(3)) for i in range(3)]
     return [v for i in range(3) for v in (*turn[i], shift[i])] + [0, 0, 0, 1]
 
 
 def fixed():
-    """The same pictures as a camera beside the robot sees them: the flange carries the board where it carried the camera."""
+    """Makes the recording of a camera beside the robot from the same pictures: the poses are inverted, so that the flange
+    carries the board instead of the camera."""
     to = os.path.join(folder, "fixed")
-    # The page asks for no pose file: meta.json names the one.
+    # The page does not ask for a pose file: meta.json names the only one.
     meta = os.path.join(folder, "handeye", "meta.json")
     with open(meta) as f:
         told = json.load(f)
@@ -62,7 +63,7 @@ calibrate = lambda *words: run("calibrate", "hand-eye", os.path.join(folder, "fi
 s = Server(program, folder, "--recordings", folder)
 try:
     order = {"procedure": "calibrate", "target": "hand_eye", "recording": "fixed"}
-    # Nothing says that the camera stands still: it is taken to be on the flange, which these pictures contradict.
+    # No setting states the mount: the camera is assumed to be on the flange, which contradicts these pictures.
     wrong = s.job(order)
     assert wrong["state"] == "failed" or "accepted" in wrong["outcome"] and wrong["outcome"]["verdict"] != "good", wrong
     plain = s.job({**order, "recording": "handeye"})["outcome"]
@@ -84,7 +85,8 @@ try:
     off = math.dist([truth[k] for k in (3, 7, 11)], [made["value"][k] for k in (3, 7, 11)])
     print(f"a camera that stands still: {o['verdict']}, {off:.4f} mm from the truth")
     assert off < 0.5, off
-    # The command line: the option states the mount where the station does not, has to agree where it does, and is not needed then.
+    # On the command line the option states the mount if the station does not. If the station does, the option is not needed
+    # and must agree.
     done = calibrate(by_hand, "--mount", "eye-to-hand")
     assert done.returncode == 0, done.stderr
     shutil.copy(os.path.join(station, "station.toml"), twin)
@@ -97,7 +99,7 @@ try:
         theirs = record(where, "base_camera")
         for key in ("value", "covariance", "inputs"):
             assert theirs[key] == made[key], (where, key)
-    # All at once takes the same mount.
+    # The joint calibration uses the same mount.
     joint = s.job({"procedure": "joint", "recordings": ["intrinsics", "fixed"]})
     assert joint["state"] == "done", joint
     kept = record(os.path.join(station, "jobs", joint["id"], "result"), "base_camera")

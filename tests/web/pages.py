@@ -1,6 +1,6 @@
-"""In: the program, a simulated station with known truth. Out: failure where an operator cannot go from scan to position through
-the real pages in a real browser, where a script complains, where a text cannot be read, or where a page has no name for something.
-With a third argument the pages' pictures go into that folder.
+"""In: the program, a simulated station with known truth, and optionally a folder for screenshots. Out: failure if an operator
+cannot go from scan to position with the real pages in a real browser, if a script reports an error, if a text has too
+little contrast, or if a control has no accessible name.
 Frame and unit: mm, degrees, CSS pixels, seconds."""
 
 import json
@@ -24,7 +24,7 @@ pictures = sys.argv[3] if len(sys.argv) > 3 else None
 shot = lambda b, name: shots.shot(b, pictures, name)
 PAGES = ["station", "picture", "calibrate", "touch", "scan", "surface", "part", "position", "replay", "health", "settings"]
 
-# Text that stands out less than WCAG 2.2 AA asks (4.5, large text 3), and things to press without a name.
+# Finds text with less contrast than WCAG 2.2 AA requires (4.5, large text 3), and controls that are too small or unnamed.
 CONTRAST = """
 const parse = (c) => { const m = /rgba?\\(([^)]+)\\)/.exec(c); const v = m[1].split(/[ ,/]+/).map(Number); return v.length > 3 ? v : [...v, 1]; };
 const lin = (v) => (v /= 255) <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
@@ -54,8 +54,8 @@ return bad;
 
 
 def usable(b):
-    """The first page can be used within a second of its address: what it costs itself, for other programs run here too. Loads are made until
-    one is not slowed by them."""
+    """The first page is usable within a second of its request. Other programs may slow a load, so that the page is loaded
+    until one load is fast enough, for at most a minute."""
     times, end = [], time.monotonic() + 60
     while not times or (times[-1] >= 1000 and time.monotonic() < end):
         b.reload("station")
@@ -65,7 +65,7 @@ def usable(b):
 
 
 def insertion(s, b):
-    """From the first page to the position in a recording, as an operator goes; the pose against the truth."""
+    """An operator goes from the first page to the position in a recording; the pose is compared with the truth."""
     b.open(s.url)
     b.ready("station")
     assert "token" not in b.run("return location.href"), "the token stays in the address"
@@ -111,7 +111,7 @@ def insertion(s, b):
 
 
 def surface(s, b):
-    """A section over the board's edge of a socket, two points, a point over a plane: numbers with sigma; three dimensions."""
+    """A section over the edge of a socket, the distance of two points, a point above a plane, each with sigma; the 3-D view."""
     b.page("surface")
     b.until("the map", "return document.querySelector('.map canvas')?.width > 300")
     for tool, words in (("section", "Section"), ("points", "Distance")):
@@ -121,7 +121,7 @@ def surface(s, b):
     b.until("a curve", "return document.querySelector('.plot .curve')")
     b.drag(".plot", (0.2, 0.5), (0.3, 0.5))
     b.until("a fitted line", "return document.querySelector('.plot .fit')")
-    # A second piece by keyboard alone: arrows to its ends, Enter at both.
+    # A second piece with the keyboard only: arrows move to its ends, Enter sets them.
     b.run("document.querySelector('svg.plot[tabindex]').focus()")
     b.keys(*["\ue014"] * 10, "\ue007", *["\ue014"] * 12, "\ue007")
     b.until("a second fitted line", "return document.querySelectorAll('.plot .fit').length === 2")
@@ -130,14 +130,14 @@ def surface(s, b):
     b.drag(".map canvas", (0.5, 0.5), (0.5, 0.5))
     b.until("a height over a plane", "return /Above the plane .*±/.test(document.body.innerText)")
     shot(b, "measure")
-    # By keyboard alone: the cross is moved, Enter puts the two ends.
+    # With the keyboard only: arrows move the cross, Enter sets the two points.
     b.click("[data-tool=points]")
     before = b.text("#main").count("Distance")
     b.run("document.querySelector('.map canvas').focus()")
     b.keys("\ue012", "\ue007", "\ue013", "\ue013", "\ue007")
     b.until("a distance by keyboard", "return (document.getElementById('main').innerText.match(/Distance/g) ?? []).length > arguments[0]", before)
     b.click("#three")
-    # As many as this machine turns at first, and all of them once they stand.
+    # During a rotation as many points are drawn as this machine can, and all of them when the view rests.
     b.until("points", "return Number(document.querySelector('[data-shown]')?.dataset.shown) > 5000")
     b.drag("[data-shown] canvas", (0.4, 0.4), (0.6, 0.5))
     b.drag("[data-shown] canvas", (0.5, 0.55), (0.5, 0.55))
@@ -147,7 +147,8 @@ def surface(s, b):
 
 
 def teach(s, b):
-    """A new part from a box drawn around the socket, found by its own recipe afterwards; a broken recipe is named beside it."""
+    """Teaches a new part from a box drawn around the socket, then finds it with its recipe. The fault of a broken recipe is shown
+    beside the recipe."""
     scan = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "scan")["id"]
     found = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "find")["outcome"]
     head = s.json("GET", f"/scans/{scan}/map")
@@ -158,7 +159,7 @@ def teach(s, b):
     b.page("part")
     b.until("the map", "return document.querySelector('.map canvas')?.width > 300")
     b.click("[data-tool=outline]")
-    # Where the box lies on the canvas: the map stands fitted and centred in it.
+    # Position of the box on the canvas: the map is fitted into the canvas and centred.
     w, h = b.place(".map canvas")[2:]
     size = [head["width"] * head["cell_mm"], head["height"] * head["cell_mm"]]
     k = min(w / size[0], h / size[1]) * 0.97
@@ -189,7 +190,7 @@ def teach(s, b):
     assert stored() == before, "it was replaced without being asked for twice"
     b.click("#save-recipe")
     b.until("the line of a broken recipe", "return /line 3|cell_mm/.test(document.querySelector('.problem')?.innerText ?? '')")
-    # A right text takes its place at the second press, and the former one lies in a backup.
+    # A correct text replaces the recipe at the second press, and a backup contains the previous text.
     b.run("document.querySelector('textarea').value = arguments[0]", "# mine\n" + before)
     b.click("#save-recipe")
     b.click("#save-recipe")
@@ -199,7 +200,7 @@ def teach(s, b):
     assert len(kept) == 1 and kept[0]["name"].endswith("before-recipe.json"), kept
     _, _, data = s.ask("GET", f"/api/v1/backups/{kept[0]['name']}")
     assert json.loads(data)["files"]["recipes/part.toml"] == before
-    # Taught once more under its name: refused before anything is measured, unless it is to take the place of the former one.
+    # Teaching again under the same name is refused before anything is measured, unless `replace` is set.
     order = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "teach")["order"]
     s.json("POST", "/lease", {"firmly": True})
     refused = s.job({**order, "replace": False})
@@ -211,12 +212,12 @@ def teach(s, b):
     quiet(b, "teach", refused=1)
 
 
-# Opposite contacts of data/recipes/led.toml, in the part's own frame.
+# Opposite contacts of data/recipes/led.toml, in the part frame, mm.
 PINS = ((-5.5 * 2.54, -7.62), (5.5 * 2.54, 7.62))
 
 
 def pins(s, b):
-    """Two clicks on pins: the tool goes where their middle says, with the sigma of two pins; a click beside all pins is named."""
+    """Two clicks on pins: the tool goes to their midpoint, with the sigma of two pins. A click beside all pins is reported."""
     scan = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "scan")["id"]
     former = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "find")["outcome"]
     head = s.json("GET", f"/scans/{scan}/map")
@@ -232,7 +233,7 @@ def pins(s, b):
     size = [head["width"] * head["cell_mm"], head["height"] * head["cell_mm"]]
 
     def click(place):
-        # What is said above the map makes it smaller: it is looked at before each click.
+        # A message above the map makes the map smaller, so that its size is read before each click.
         w, h = b.place(".map canvas")[2:]
         k = min(w / size[0], h / size[1]) * 0.97
         at = (0.5 + k * (place[0] - size[0] / 2) / w, 0.5 - k * (place[1] - size[1] / 2) / h)
@@ -264,7 +265,7 @@ def pins(s, b):
 
 
 def copied(s, b):
-    """A copied tab comes with the operator's name in its memory and is another tab all the same; a page that is loaded again is the same."""
+    """A copied tab has the operator's name in its session storage, but gets a new name. A reloaded page keeps its name."""
     mine = lambda: b.run("return sessionStorage.tab")
     b.page("station")
     name, here = mine(), b.ask("GET", "/window")
@@ -282,14 +283,14 @@ def copied(s, b):
 
 
 def replay(s, b):
-    """The same recording with another setting, beside the former one."""
+    """Scans the same recording with another setting, and compares it with the previous scan."""
     b.page("replay")
     b.run("const s = [...document.querySelectorAll('select')].at(-1); s.value = 'choose.quality' in s ? s.value : s.value")
     b.run("[...document.querySelectorAll('button')].find((e) => e.innerText === 'Add').click()")
     b.click("#again")
     b.until("a difference", "return /cells in both/.test(document.getElementById('main').innerText)")
     shot(b, "replay")
-    # A batch: the recording scanned and searched again with the other setting; how far the places lie apart, as reckoned here.
+    # A batch scans and searches the recording again with the other setting. The scatter of the poses is computed here too.
     finds = lambda: [j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "find" and j["state"] == "done" and not j["order"].get("pins") and j["outcome"]["recipe"] == "led"]
     before = len(finds())
     b.run("const e = [...document.querySelectorAll('select')].find((x) => [...x.options].some((o) => o.value === 'led')); e.value = 'led'; e.dispatchEvent(new Event('change'))")
@@ -321,7 +322,7 @@ def rest(s, b):
 
 
 def legible(b):
-    """Every page in both lights: contrast and names; every language: the table's own words, in all pages without a complaint."""
+    """Every page in both colour themes: contrast and names. Every language: its words from the table, without an error on any page."""
     for theme in ("dark", "light"):
         b.page(PAGES[-1])
         b.run("localStorage.theme = arguments[0]", theme)
@@ -350,7 +351,7 @@ def legible(b):
 
 
 def lost(s, b):
-    """The server is killed: the screen says so; a new start needs a new address, and says that."""
+    """After the server is killed, the screen says that the program does not answer."""
     b.page("station")
     s.kill()
     b.until("that the program is gone", "return /does not answer/.test(document.getElementById('bar').innerText)")

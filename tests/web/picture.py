@@ -1,5 +1,5 @@
-"""In: the program, a simulated station, its simulated camera, a browser. Out: failure where the camera cannot be set from the page Picture, where
-the exposure that was found is lost, where a region is not kept to, or where the stripe is described otherwise than its pictures show it.
+"""In: the program, a simulated station, its simulated camera, a browser. Out: failure if the page Picture cannot set the
+camera, if the found exposure is lost, if the region is ignored, or if the figures of the stripe do not match its pictures.
 Frame and unit: px, us, shares of full scale."""
 
 import json
@@ -20,7 +20,7 @@ REGION = "extraction.region"
 
 
 def newest(s):
-    """u, v and fate of the newest picture's peaks; its grey levels."""
+    """The newest picture: u, v and `fate` of its peaks, its grey levels, its width."""
     while True:
         status, _, b = s.ask("GET", "/api/v1/camera/newest")
         if status == 200:
@@ -34,7 +34,7 @@ def exposure(s):
 
 
 def by_hand(s):
-    """The camera is set by who operates; what cannot be is refused; a setting outlives the connection that it was made over."""
+    """Only the tab with the lease can set the camera, impossible values are refused, and a setting takes effect in the pictures."""
     until("what the camera can be set to", lambda: s.json("GET", "/camera")["features"])
     assert exposure(s)["value"] == 1000 and exposure(s)["unit"] == "us" and exposure(s)["range"] == [1, 1e6], exposure(s)
     ask = lambda name, value: s.ask("PUT", "/api/v1/camera/features", {"name": name, "value": value})[0]
@@ -51,7 +51,7 @@ def by_hand(s):
 
 
 def tuned(s, b):
-    """Set exposure: the stripe's peaks stand where they are wanted, in the pictures that come afterwards too."""
+    """Set exposure brings the stripe's peaks into the wanted range, also in later pictures."""
     b.page("picture")
     b.until("the stripe", "return document.querySelector('[data-stripe=seen] .figure')")
     b.click("#set-exposure")
@@ -62,7 +62,7 @@ def tuned(s, b):
     assert abs(exposure(s)["value"] - us) < 1e-6 * us, (exposure(s), us)
     until("peaks where they are wanted", lambda: (s.json("GET", "/camera/look")["stripe"] or {"peak": 0})["peak"] > low - 0.08)
     print(f"exposure: {us:.0f} us after {len(job['tried'])} tries, peaks at {100 * job['look']['stripe']['peak']:.0f} %")
-    # By hand, on the page.
+    # Manual setting on the page.
     b.until("the field", "return document.querySelector('[data-feature=ExposureTime]')")
     b.run("const e = document.querySelector('[data-feature=ExposureTime]'); e.value = arguments[0]; e.dispatchEvent(new Event('change'))", str(round(us * 0.8)))
     until("what was written into the field", lambda: exposure(s)["value"] == round(us * 0.8))
@@ -70,7 +70,7 @@ def tuned(s, b):
 
 
 def lit(b):
-    """Set exposure with an armed robot: its controller's line is switched on for it and off afterwards, and the bar says so."""
+    """Set exposure with an armed robot: its controller switches the line laser on and off again, and the bar shows it."""
     cell_folder = os.path.join(folder, "cell")
     os.makedirs(cell_folder)
     cell = subprocess.Popen([program, "--json", "cell", "simulate", "--part", "osc", "--robot-port", "0", "--camera-port", "0", "--station", os.path.join(cell_folder, "station"), "--log", os.path.join(cell_folder, "cell.jsonl")], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
@@ -85,7 +85,7 @@ def lit(b):
         b.click("#arm")
         b.until("armed", "return document.querySelector('#arm')?.getAttribute('aria-pressed') === 'true'")
         def line():
-            """How the line changed. Before it lights, the program switches it off once more, to know how it stands."""
+            """Changes of the laser's output. The program first switches it off once more, so that its state is known."""
             said = [e["on"] for e in events(cell_folder) if e["what"] == "output" and e["number"] == 24]
             return [on for before, on in zip([False] + said, said) if on != before]
 
@@ -95,7 +95,7 @@ def lit(b):
         tries = 0
 
         def tune():
-            """The bar says that the laser is on, where the machine lets it look meanwhile."""
+            """Sets the exposure; the bar must show that the laser is on. Discards the trial if the machine stalled meanwhile."""
             nonlocal tries
             tries += 1
             b.page("station")
@@ -113,7 +113,7 @@ def lit(b):
             return us
 
         us = stalls.again("the laser in the bar", tune)
-        # The bar and the cell's log are written by two programs.
+        # Two programs write the bar and the cell's log, so that the log may be later.
         until("the line in the log, on and off once each time", lambda: len(line()) >= 2 * tries)
         assert line() == [True, False] * tries, line()
         job = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "tune")
@@ -129,7 +129,7 @@ def lit(b):
 
 
 def region(s, b):
-    """The stripe is looked for in the region that was drawn, and nowhere else; a reload and other screens know it."""
+    """The stripe is searched only in the drawn region. The region survives a reload and is shown on other screens."""
     peaks = lambda: [p for p in newest(s)[0] if p[2] == 0]
     width = newest(s)[2]
     until("peaks on both sides", lambda: (lambda p: min(x[0] for x in p) < 0.2 * width and max(x[0] for x in p) > 0.8 * width)(peaks() or [(width / 2, 0)]))
@@ -143,9 +143,9 @@ def region(s, b):
     assert kept[:2] == [0, 0] and kept[3] == 1 and abs(kept[2] - 0.5) < 0.01, kept
     inside = until("peaks in the region alone", lambda: (lambda p: p if p and max(x[0] for x in p) < kept[2] * width else None)(peaks()))
     assert min(x[0] for x in inside) < 0.2 * width, "the region took what it should have left"
-    # The page goes on from what was kept once it has the answer.
+    # The page continues with the stored region after the server's answer.
     b.until("that it was kept", "return document.querySelector('.region').dataset.saved")
-    # By keyboard: an arrow moves an edge by a hundredth.
+    # With the keyboard: an arrow key moves an edge by a hundredth of the picture.
     b.run("document.querySelector('[data-grip=\"-1,0\"]').focus()")
     b.keys("\ue014")
     until("an edge that was moved by an arrow", lambda: abs(s.json("GET", "/settings")["values"][REGION][0] - 0.01) < 1e-6)
@@ -160,13 +160,13 @@ def region(s, b):
 
 
 def pointed(s, b):
-    """What the page reads at its middle is the picture's middle, on a screen of any fineness."""
+    """The pixel shown for the centre of the map is the centre of the picture. Returns the device pixel ratio."""
     _, grey, width = newest(s)
     height = len(grey) // width
     left, top, wide, high = b.place(".map canvas")
     b.mouse({"type": "pointerMove", "duration": 0, "x": round(left + wide / 2), "y": round(top + high / 2)})
     read = b.until("what stands there", "return document.querySelector('.map .read').textContent.match(/u (\\d+) +v (\\d+) +(\\d+)/)")
-    # The window's own rounding: a CSS pixel, and the picture is 0.97 of the box.
+    # Tolerance: the mouse is placed to one CSS pixel, and the picture fills 0.97 of the box.
     off = [abs(int(read[1]) + 0.5 - width / 2), abs(int(read[2]) + 0.5 - height / 2)]
     assert max(off) <= 1 + 1.1 * max(width / wide, height / high), (read, width, height, wide, high)
     sharp = b.run("const c = document.querySelector('.map canvas'), r = c.getBoundingClientRect(); return [c.width / r.width, c.height / r.height, devicePixelRatio]")
@@ -175,7 +175,7 @@ def pointed(s, b):
 
 
 def recorded(s, b):
-    """A recording's picture is described too: its levels are those of the picture."""
+    """The figures of the stripe are also shown for a picture of a recording."""
     b.run("const e = document.querySelector('.head select'); e.value = 'scan'; e.dispatchEvent(new Event('change'))")
     look = s.json("GET", "/look?recording=scan&frame=30")
     stripe = look["stripe"]
@@ -201,7 +201,7 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         assert pointed(s, b) == 1
         region(s, b)
         recorded(s, b)
-        # A page that is left asks nobody who is gone.
+        # Leaves the page, so that it sends no requests after the server has ended.
         b.open("about:blank")
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as other:
             fine = Browser(other, flags=("--force-device-scale-factor=2",))
@@ -211,7 +211,7 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
                 fine.page("picture")
                 fine.until("a picture", "return document.querySelector('.map')?.dataset.number")
                 assert pointed(s, fine) == 2
-                # The other one operates still.
+                # The other browser still holds the lease.
                 fine.click("#lease")
                 fine.until("the lease", "return document.querySelector('#lease').getAttribute('aria-pressed') === 'true'")
                 region(s, fine)

@@ -1,6 +1,6 @@
-"""In: the program, a simulated station, a browser; an insertion that was made. Out: failure where the way over a part that the page Scan draws
-is another than the job's or the command line's, where speed, step and pictures a second do not go together, where repeats are reckoned
-otherwise on the page than on the command line, or where drops are not counted.
+"""In: the program, a simulated station, a browser, a finished insertion. Out: failure if the path over a part on the page Scan
+differs from that of the job or the command line, if speed, step and picture rate are inconsistent, if page and command
+line compute different repeatability, or if dropped pictures are not counted.
 Frame and unit: mm, mm/s, pictures a second."""
 
 import csv
@@ -17,14 +17,15 @@ FIGURES = ("depth_mm", "length_mm", "step_mm", "shots", "part_mm", "field_mm", "
 def command(program, *words, code=0):
     done = subprocess.run([program, "--json", *words], capture_output=True, text=True, timeout=300)
     assert done.returncode == code, (words, done.returncode, done.stderr)
-    # Where it failed the fault stands behind the result.
+    # If the command failed, the fault follows the result.
     return json.JSONDecoder().raw_decode(done.stdout)[0]
 
 
 def as_the_job(program, s, job, sweep_mm):
-    """The sweep that is shown is the one that the job made: its poses, shot by shot, at both ends, on page and command line."""
+    """The planned sweep, from the server and the command line, is the one that the job made: number of shots, and the poses of
+    the first and the last shot."""
     shown = s.json("GET", f"/sweep?recipe={job['order']['recipe']}&job={job['id']}&sweep_mm={sweep_mm}")
-    # A simulated cell's folder has its station in it.
+    # The folder of a simulated cell contains its station.
     station = s.station if os.path.isdir(os.path.join(s.station, "jobs")) else os.path.join(s.station, "station")
     folder = os.path.join(station, "jobs", job["id"])
     made = os.path.join(folder, "insertion")
@@ -46,7 +47,7 @@ def as_the_job(program, s, job, sweep_mm):
 
 
 def drawn(s, b, recipe):
-    """The page Scan draws it, and its figures go together; the slowest of camera, chain and arm limits."""
+    """The page Scan draws the sweep, its figures are consistent, and the slowest of camera, chain and arm is named as the limit."""
     b.run("sessionStorage.recipe = arguments[0]", recipe)
     b.page("scan")
     plan = s.json("GET", f"/sweep?recipe={recipe}")
@@ -54,10 +55,10 @@ def drawn(s, b, recipe):
     points = b.run("return document.querySelector('.sweep .band').getAttribute('points')")
     corners = [[float(v) for v in p.split(",")] for p in points.split()]
     assert all(math.dist(p, q) < 0.02 for p, q in zip(corners, plan["swept_mm"])), (corners, plan["swept_mm"])
-    # A rectangle as long as the sweep, its ends at the picture's edges.
+    # The swept area is as long as the sweep.
     a, c = plan["swept_mm"][0], plan["swept_mm"][3]
     assert abs(math.dist(a, c) - plan["length_mm"]) < 1e-9
-    # A camera that is slower than what is measured here limits, on any machine.
+    # A camera that is slower than the processing chain is the limit, on any machine.
     slow = min(20, 0.5 * plan["chain_hz"]) if plan["chain_hz"] else 20
     for hz, step, limits in ((slow, 0.2, "camera"), (1e6, plan["limit_mm_s"] and 50, "speed")):
         if not step:
@@ -67,7 +68,8 @@ def drawn(s, b, recipe):
         pace = s.json("GET", f"/sweep?recipe={recipe}&camera_hz={hz}&step_mm={step}")["pace"]
         assert pace["limited_by"] == limits and abs(pace["rate_hz"] * pace["step_mm"] - pace["speed_mm_s"]) < 1e-9 * pace["speed_mm_s"], pace
         assert abs(pace["seconds"] * pace["speed_mm_s"] - plan["length_mm"]) < 1e-6, pace
-        # The page has asked anew for each change and for what the bar told: what it showed before may have had the same limit.
+        # The page updates after each change and with the bar. An earlier plan may show the same limit, so that the figures are
+        # checked too.
         b.until(
             f"that the {limits} limits, at {pace}",
             "const e = document.querySelector('[data-limit]'); return e?.dataset.limit === arguments[0] && arguments[1].every((v) => e.previousElementSibling.innerText.includes(v))",
@@ -81,7 +83,8 @@ def drawn(s, b, recipe):
 
 
 def batch(program, s, folder):
-    """Several recordings by one command: each scan is the page's, the table has every line, repeats are those that the page is told."""
+    """One command scans several recordings. Its scans are equal to those of the page, its table has every row, and its
+    repeatability is that of the server."""
     out = os.path.join(folder, "batch")
     scan = os.path.join(folder, "scan")
     s.json("POST", "/lease", {"firmly": True})
@@ -94,7 +97,7 @@ def batch(program, s, folder):
     first = finds[0]["outcome"]
     assert all(r["points"] == jobs[0]["outcome"]["points"] and math.dist(r["found"]["part"], first["part"]) < 1e-9 for r in made["rows"]), made["rows"]
     assert all(a["scatter"] < 1e-12 and a["stated"] > 0 for a in made["repeats"]["along"]), made["repeats"]
-    # With another setting the place is another one, and both tell the same of the two.
+    # Another setting gives another pose, and server and command line agree on it.
     other = command(program, "batch", scan, "--station", s.station, "--recipe", recipe, "--set", "threshold.minimum=20", "--out", out + "2")
     assert math.dist(other["rows"][0]["found"]["part"], finds[1]["outcome"]["part"]) < 1e-9 and other["repeats"] is None
     told = s.json("POST", "/repeats", {"jobs": [j["id"] for j in finds]})
@@ -104,7 +107,7 @@ def batch(program, s, folder):
     with open(os.path.join(out, "batch.csv"), newline="") as f:
         rows = list(csv.DictReader(f))
     assert [float(r["x_mm"]) for r in rows] == [r["found"]["part"][3] for r in made["rows"]] and rows[0]["passed"] == "true", rows
-    # One that is none is named, and the others go on.
+    # A folder that is no recording is reported, and the others are processed.
     worse = command(program, "batch", os.path.join(folder, "none"), scan, "--station", s.station, "--recipe", recipe, "--out", out + "3", code=1)
     assert worse["rows"][0]["problem"] and not worse["rows"][1]["problem"], worse["rows"]
     done = subprocess.run([program, "batch", scan, "--station", s.station, "--out", folder], capture_output=True, text=True)
@@ -113,7 +116,7 @@ def batch(program, s, folder):
 
 
 def health(program, s, b):
-    """Drops are counted at half and at full resolution while pictures come at the stated rate; every picture is accounted for."""
+    """Dropped pictures are counted at half and at full resolution at the stated rate; every picture is accounted for."""
     b.page("health")
     b.run("const e = document.getElementById('rate'); e.value = 2000; e.dispatchEvent(new Event('change'))")
     b.click("#benchmark")
@@ -123,7 +126,7 @@ def health(program, s, b):
         assert k["rate_hz"] == 2000 and k["sent"] == k["measured"] + k["passed_over"] + k["lost"] and k["measured"] > 0, k
     half, full = kept
     assert [half["width"], full["width"]] == [640, 1280] and full["ms"][0] > half["ms"][0], kept
-    # No machine that tests run on measures 2000 full pictures a second.
+    # No test machine measures 2000 pictures a second at full resolution.
     assert full["passed_over"] + full["lost"] > 0 and full["measured"] < half["measured"], kept
     cells = b.run("return [...document.querySelectorAll('[data-kept] tbody td')].map((e) => e.innerText)")
     assert str(full["passed_over"]) in " ".join(cells), cells

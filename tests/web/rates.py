@@ -1,6 +1,6 @@
-"""In: the program, a folder with a simulated station of 1280x960 and its scan. Out: the numbers of a busy screen, printed: how fast the
-scan runs alone, beside a camera of 30 pictures a second, and with two browsers that look at it; how old the pictures are that they show.
-Failure where a picture is shown that is not the newest, or one is not counted: what does not hang on the clock.
+"""In: the program, a folder with a simulated station of 1280x960 and its scan. Out: printed figures of a busy screen: the
+speed of a scan alone, beside a camera of 30 pictures a second, and with two browsers that show the camera; the age of the
+pictures that the browsers show. Failure only for what does not depend on speed: an outdated or an uncounted picture.
 Frame and unit: px, ms, pictures and shots a second."""
 
 import glob
@@ -18,12 +18,12 @@ from shots import quiet
 
 program, folder = sys.argv[1:3]
 RATE, ROUNDS, SIZE = 30, 10, (1280, 960)
-# Before each scan, whatever is looked at, s: a page is drawn whole by then.
+# Pause before each scan, s, with and without viewers: a page is completely drawn by then.
 SETTLES = 1.5
-# As a browser on a machine without a GPU puts its pages together; the other tests' browser draws them with WebGL in software.
+# Composes pages as a browser on a machine without a GPU does. The browser of the other tests uses WebGL in software.
 PLAIN = ("--disable-gpu-compositing",)
 
-# Notes which picture is drawn when: its number is in its first four pixels.
+# Records when each picture is drawn. The number of a picture is in its first four pixels.
 WATCH = """
   window.seen = [];
   let last = -1;
@@ -40,7 +40,7 @@ WATCH = """
 
 
 def scan(s):
-    """Shots a second of a scan."""
+    """Runs a scan and returns its shots a second."""
     time.sleep(SETTLES)
     job = s.job({"procedure": "scan", "recording": "scan"}, 300)
     assert job["state"] == "done", job
@@ -62,7 +62,7 @@ def look_on(s, browsers):
 
 
 def turn_away(browsers, seen):
-    """Keeps what each browser has shown, and shows it an empty page."""
+    """Stores what each browser has shown, then opens an empty page."""
     for k, b in enumerate(browsers):
         seen[k].append(b.run("return window.seen"))
         quiet(b, f"browser {k}")
@@ -76,7 +76,7 @@ def main():
     s = Server(program, folder, "--recordings", folder, "--camera", "-", "--raw", f"{SIZE[0]}x{SIZE[1]}:gray8", stdin=subprocess.PIPE)
     feed = Feed(s.process.stdin, frames, RATE)
     scan(s)
-    # In turns: what else the machine does changes by more from minute to minute than what is asked for here.
+    # The cases alternate, because the load of the machine varies more from minute to minute than the differences measured here.
     rounds, seen = [], [[], []]
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as one, tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as two:
         browsers = [Browser(one, flags=PLAIN), Browser(two, flags=PLAIN)]

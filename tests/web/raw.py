@@ -1,4 +1,4 @@
-"""In: recorded pictures. Out: the same as a camera's bytes, sent at a steady rate.
+"""In: recorded pictures. Out: the same pictures as raw bytes of a camera, sent at a steady rate.
 Frame and unit: px, pictures a second."""
 
 import struct
@@ -10,7 +10,7 @@ from browser import unfilter
 
 
 def grey(path):
-    """A PNG of 8 bits as it comes from a sensor."""
+    """The grey levels of an 8-bit PNG, row by row, as a sensor delivers them."""
     with open(path, "rb") as f:
         png = f.read()
     width, height = struct.unpack(">II", png[16:24])
@@ -27,7 +27,8 @@ def grey(path):
 
 
 class Feed:
-    """Sends pictures in turn until `end`; the first four pixels of each are its number, `sent[number]` is when its last byte went."""
+    """Sends the pictures cyclically until `end`. The first four pixels of each hold its number; `sent[number]` is the time at
+    which its last byte was sent."""
 
     def __init__(self, pipe, frames, rate):
         self.pipe, self.frames, self.rate, self.sent, self.over = pipe, frames, rate, [], False
@@ -49,7 +50,7 @@ class Feed:
         self.pipe.close()
 
     def rest(self, rests):
-        """Sends nothing for a while, or again."""
+        """Pauses sending, or continues it."""
         self.goes.clear() if rests else self.goes.set()
 
     def end(self):

@@ -1,4 +1,4 @@
-"""In: a recording. Out: the same pictures again and again, for what has to be met in the middle of a scan.
+"""In: a recording. Out: a recording that repeats its pictures, for tests that must act during a scan.
 Frame and unit: none."""
 
 import json
@@ -7,7 +7,7 @@ import shutil
 
 
 def longer(folder, times):
-    """A copy of the recording `scan` beside it, so many times as long; its name."""
+    """Makes a copy of the recording `scan` that is `times` times as long. Returns its name."""
     name = f"scan-{times}-times"
     copy = shutil.copytree(os.path.join(folder, "scan"), os.path.join(folder, name))
     path = os.path.join(copy, "meta.json")

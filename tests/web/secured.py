@@ -1,5 +1,5 @@
-"""In: the program, a station. Out: failure where the screen, served with a password and TLS, lets in who does not know it, speaks without
-TLS, or starts with files that are none.
+"""In: the program, a station. Out: failure if the screen, served with a password and TLS, admits somebody without the
+password, answers without TLS, or starts with invalid files.
 Frame and unit: s."""
 
 import http.client
@@ -25,7 +25,7 @@ def file(name):
 
 
 def typed(out, *lines):
-    """What a terminal shows while somebody types a password, and how the program ends."""
+    """Types lines at the program's password prompt. Returns what the terminal shows, and the exit code."""
     pid, terminal = pty.fork()
     if pid == 0:
         os.execv(program, [program, "station", "password", "--out", out])
@@ -33,13 +33,13 @@ def typed(out, *lines):
     try:
         while more := os.read(terminal, 4096):
             shown += more
-            # It asks before each line, and shows nothing from then on.
+            # The program prompts for each line, and does not show what is typed.
             if asked < len(lines) and shown.count(b": ") > asked:
                 time.sleep(0.3)
                 os.write(terminal, lines[asked].encode() + b"\n")
                 asked += 1
     except OSError:
-        # The terminal is gone with the program.
+        # The terminal closes when the program ends.
         pass
     return shown.decode(), os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
 
@@ -64,7 +64,7 @@ def main():
     assert short.returncode != 0 and not os.path.exists(file("short")), short.stderr
     subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2", "-subj", "/CN=cell3.plant", "-addext", "subjectAltName=DNS:cell3.plant,IP:127.0.0.1", "-keyout", file("key.pem"), "-out", file("cert.pem")], check=True, capture_output=True)
     secured = ("--recordings", folder, "--listen", "0.0.0.0", "--name", "cell3.plant", "--password-file", file("pw"))
-    # Without TLS, with the password itself as its hash, with a key that is none: it does not start, and says why.
+    # Without a password file, with a password instead of its hash, or with an invalid key, it does not start and says why.
     with open(file("plain"), "w") as f:
         f.write(PASSWORD + "\n")
     for more, why in (
@@ -92,9 +92,10 @@ def main():
     for knock in ({"password": ""}, {"password": PASSWORD + " "}, {"password": text.strip()}, {"token": "0" * 32}):
         begun = time.time()
         assert ask("POST", "/api/v1/session", knock)[0] == 401, knock
-        # Passwords are tried slowly.
+        # A wrong password is answered only after at least 0.5 s.
         assert "token" in knock or time.time() - begun > 0.5
-    # Another machine tries one wrong password after the other, ten at a time. It is told to wait, and the right one of this machine does not.
+    # Another machine tries wrong passwords in ten threads. It is told to wait, while the right password from this machine is
+    # accepted without delay.
     answers, over = [], threading.Event()
 
     def guesses():
@@ -116,14 +117,15 @@ def main():
     print(f"{len(answers)} wrong passwords from another machine, {sum(s == 429 for s, _ in answers)} of them refused untried; the right one took {took:.2f} s")
     assert all(s in (401, 429) and (s == 401 or int(after) >= 1) for s, after in answers), answers
     assert any(s == 429 for s, _ in answers) and sum(s == 401 for s, _ in answers) < 30, answers
-    # In a row with theirs it would take more than two seconds.
+    # Queued behind the wrong passwords, the right one would take more than two seconds.
     assert took < 2, took
     cookie = head["set-cookie"]
     assert all(word in cookie for word in ("Secure", "HttpOnly", "SameSite=Strict")), cookie
     cookie = cookie.split(";")[0]
     assert ask("GET", "/api/v1/bar", Cookie=cookie)[0] == 200
     assert ask("GET", "/api/v1/bar", host=f"cell3.plant:{port}", Cookie=cookie)[0] == 200
-    # By the address that was connected to, and by the name without a port, as where a router leads from 443 to here; by nothing else.
+    # The Host may be the address of the connection, or the name without a port, as when a router forwards port 443. Any other
+    # Host is refused.
     context.check_hostname = False
     assert ask("GET", "/api/v1/bar", to="127.0.0.3", Cookie=cookie)[0] == 200
     assert ask("GET", "/api/v1/bar", host="cell3.plant", Cookie=cookie)[0] == 200
@@ -133,7 +135,7 @@ def main():
     assert s.url.startswith(f"https://cell3.plant:{port}/#token="), s.url
     assert 400 <= ask("POST", "/api/v1/lease", {}, Cookie=cookie, Origin=f"http://cell3.plant:{port}")[0] < 500, "a page without TLS"
     assert ask("POST", "/api/v1/lease", {}, Cookie=cookie, Origin=f"https://cell3.plant:{port}")[0] == 200
-    # Plain HTTP on the same port gets no answer.
+    # Plain HTTP on the same port is not answered.
     plain = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE)
     try:
         plain.request("GET", "/", headers={"Host": f"127.0.0.1:{port}"})

@@ -1,4 +1,4 @@
-"""In: the program under test, a folder with a simulated station. Out: its screen as a process, and raw requests to it.
+"""In: the program under test, a folder with a simulated station. Out: the screen as a server process, and raw requests to it.
 Frame and unit: seconds."""
 
 import atexit
@@ -18,12 +18,12 @@ class Server:
     """`sheetlight station serve` on any free port."""
 
     def __init__(self, program, folder, *more, stdin=None, env=None):
-        """With --simulate the folder gets its station; else it holds one."""
+        """With --simulate the program creates the station in `folder`; otherwise `folder` contains one."""
         station = folder if "--simulate" in more else os.path.join(folder, "station")
         self.station = station
         command = [program, "--json", "station", "serve", "--station", station, *(() if "--port" in more else ("--port", "0")), *more]
         self.process = subprocess.Popen(command, stdin=stdin, env={**os.environ, **(env or {})}, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-        # A test that fails leaves nobody serving.
+        # A test that fails leaves no server behind.
         atexit.register(self.process.kill)
         self.said = []
         reader = threading.Thread(target=lambda: self.said.extend(line.decode() for line in self.process.stderr), daemon=True)
@@ -32,7 +32,7 @@ class Server:
         while text.count("{") != text.count("}") or not text:
             line = self.process.stdout.readline().decode()
             if not line:
-                # What it said may still be on its way.
+                # The last messages of the server may not have been read yet.
                 self.process.wait(PATIENCE)
                 reader.join(PATIENCE)
             assert line, f"the server ended: {''.join(self.said)}"
@@ -43,7 +43,7 @@ class Server:
         self.token = self.url.split("token=")[1]
 
     def ask(self, method, path, body=None, host=None, token=True, tab="tests", **headers):
-        """Status, headers, body; nothing is added that was not asked for."""
+        """Sends a request without any additional headers. Returns status, headers, body."""
         name, port = self.host.rsplit(":", 1)
         c = http.client.HTTPConnection(name, int(port), timeout=PATIENCE)
         head = {"Host": host or self.host, **{k.replace("_", "-"): v for k, v in headers.items()}}
@@ -83,7 +83,7 @@ class Server:
         return until(f"the end of {name}", over, seconds)
 
     def socket(self, token=True, tab=None, **headers):
-        """A WebSocket after its handshake: status and the socket."""
+        """Opens a WebSocket. Returns the status of the handshake and the socket."""
         name, port = self.host.rsplit(":", 1)
         s = socket.create_connection((name, int(port)), timeout=PATIENCE)
         head = {"Host": self.host, "Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": base64.b64encode(os.urandom(16)).decode(), **{k.replace("_", "-"): v for k, v in headers.items()}}
@@ -107,19 +107,19 @@ class Server:
         self.process.wait(PATIENCE)
 
     def end(self):
-        """Ends it as Ctrl-C does."""
+        """Ends the server by SIGTERM. Returns its exit code."""
         self.process.terminate()
         return self.process.wait(PATIENCE)
 
 
 def say(s, text):
-    """A text of less than 126 bytes to a WebSocket, masked as clients have to."""
+    """Sends a text of less than 126 bytes over a WebSocket, masked as clients must."""
     mask, data = os.urandom(4), text.encode()
     s.sendall(bytes([0x81, 0x80 | len(data)]) + mask + bytes(b ^ mask[i % 4] for i, b in enumerate(data)))
 
 
 def events(folder):
-    """What happened in the simulated cell so far."""
+    """The events in the simulated cell's log so far."""
     path = os.path.join(folder, "cell.jsonl")
     if not os.path.exists(path):
         return []
@@ -128,7 +128,7 @@ def events(folder):
 
 
 def frame(s):
-    """The next message of a WebSocket: its kind and its bytes."""
+    """Reads the next message of a WebSocket. Returns its opcode and its bytes."""
     def exactly(n):
         out = b""
         while len(out) < n:

@@ -1,5 +1,6 @@
-"""In: the screen with a station or a simulated cell, the browser that shows it. Out: failure where a setting is changed otherwise than it was
-said, a comment or a calibration is lost, a backup does not come back, or an output is switched that nobody pressed.
+"""In: the screen with a station or a simulated cell, and a browser that shows the screen. Out: failure if a setting gets
+another value than requested, a comment or a calibration is lost, a backup cannot be restored, or an output is switched
+without a press.
 Frame and unit: as the settings."""
 
 import json
@@ -21,7 +22,7 @@ def change(b, name, value):
 
 
 def settings(program, s, b, shot):
-    """Notation and tolerance by fields, a broken text by hand, a backup that comes back."""
+    """Changes notation and tolerance through fields, enters a broken text by hand, restores a backup."""
     first = "# by the window\n" + text(s)
     with open(os.path.join(s.station, "station.toml"), "w") as f:
         f.write(first)
@@ -37,19 +38,19 @@ def settings(program, s, b, shot):
     assert now.startswith("# by the window\n") and 'robot = "ur"' in now and "tolerance_mm = 0.08" in now, now
     assert s.json("GET", "/station")["robot"] == "ur" and s.json("GET", "/bar")["station"] == "cell 3"
     shot(b, "settings")
-    # What cannot be is named, and nothing is changed.
+    # An invalid setting is reported, and nothing is changed.
     b.run("const e = document.querySelector('textarea'); e.value = e.value.replace('robot', 'robbot')")
     b.click("#save-text")
     b.until("the line of a broken setting", "return /robbot/.test(document.querySelector('#main .problem')?.innerText ?? '')")
     assert text(s) == now
-    # An editor has changed the file since: the page's change would undo that.
+    # An editor has changed the file meanwhile. The change of the page would undo that, so that it is refused.
     with open(os.path.join(s.station, "station.toml"), "a") as f:
         f.write("# later\n")
     change(b, "tolerance_mm", "0.5")
     b.click("#save-settings")
     b.until("that the file is another one", "return /changed since this page/.test(document.querySelector('#main .problem')?.innerText ?? '')")
     assert text(s) == now + "# later\n"
-    # The backup from before the first change comes back, calibrations and all; what is put away for it is a backup too.
+    # The backup from before the first change is restored with its calibrations. The replaced state becomes a backup too.
     kept = [k for k in s.json("GET", "/settings")["backups"] if "settings" in k["name"]]
     assert len(kept) == 1 and kept[0]["files"] >= 3, kept
     status, _, data = s.ask("GET", f"/api/v1/backups/{kept[0]['name']}")
@@ -73,7 +74,7 @@ def settings(program, s, b, shot):
     assert s.json("GET", "/jobs"), "jobs stay"
     for trick in ("..%2f..%2fstation.toml", "%2e%2e", "no-such.json"):
         assert s.ask("GET", f"/api/v1/backups/{trick}")[0] in (400, 404), trick
-    # The same on the command line.
+    # The command line does the same.
     run = lambda *words: subprocess.run([program, "--quiet", "station", *words, "--station", s.station], capture_output=True)
     out = os.path.join(os.path.dirname(s.station), "kept.json")
     assert run("backup", "--out", out).returncode == 0
@@ -86,7 +87,7 @@ def settings(program, s, b, shot):
 
 
 def outputs(s, b, events):
-    """An armed robot's line lights for a moment, at a press and no other; the gripper opens at the second press alone."""
+    """A press switches an armed robot's line laser on for a moment, and no other laser. The gripper opens only at the second press."""
     b.page("settings")
     b.until("outputs", "return document.querySelector('[data-output=line]')")
     assert b.run("return document.querySelector('[data-output=line]').disabled"), "outputs can be tried without arming"
@@ -98,7 +99,7 @@ def outputs(s, b, events):
     presses = 0
 
     def lit():
-        """The line is on for a second and a half, which the bar says, where the machine lets it look."""
+        """Switches the line laser on for 1.5 s; the bar must show it. Discards the trial if the machine stalled meanwhile."""
         nonlocal presses
         presses += 1
         meter.clear()
@@ -119,7 +120,7 @@ def outputs(s, b, events):
     b.until("the question", "return document.querySelector('[data-output=open]').innerText.includes('drop')")
 
     def switched():
-        """How the line changed; the other laser stays off. Both are switched off once more before and after a try."""
+        """Changes of the line laser's output; the other laser stays off. Both are also switched off before and after a try."""
         said = [(e["number"], e["on"]) for e in events()[before:] if e["what"] == "output"]
         assert (25, True) not in said, said
         line = [on for number, on in said if number == 24]
@@ -127,7 +128,7 @@ def outputs(s, b, events):
 
     waits.until("the line's end in the cell's log", lambda: len(switched()) >= 2 * presses)
     assert switched() == [True, False] * presses, switched()
-    # Settings wait while the robot is armed: its limits were read then.
+    # While the robot is armed, settings cannot be saved: its limits were read when it was armed.
     before = text(s)
     change(b, "motion.speed_mm_s", "20")
     b.click("#save-settings")

@@ -1,4 +1,4 @@
-"""In: a browser. Out: pictures of its page for the documents, small; failure where a script complains.
+"""In: a browser. Out: small screenshots for the documents; failure if the console contains an error.
 Frame and unit: seconds."""
 
 import os
@@ -9,7 +9,7 @@ from browser import levels
 
 
 def shot(b, folder, name):
-    """The page as it stands, into a folder; none: nothing."""
+    """Stores a screenshot in a folder; does nothing without a folder."""
     if folder:
         time.sleep(0.4)
         with open(os.path.join(folder, f"screen-{name}.png"), "wb") as f:
@@ -17,15 +17,15 @@ def shot(b, folder, name):
 
 
 def quiet(b, where, refused=0, aside=None):
-    """No complaint but so many refusals that were asked for: browsers write answers of 4xx there. Those of what may be refused at any time,
-    by this part of their address, are not counted."""
+    """The console contains only the expected refusals: a browser logs each answer 4xx there. Messages that contain `aside`, a
+    part of an address that may be refused at any time, are ignored."""
     said = []
 
     def asked():
         said.extend(m for m in b.console() if not aside or aside not in m)
         return [m for m in said if "status of 4" in m]
 
-    # A refusal is shown by the page and written by the browser, in no order.
+    # The page shows a refusal and the browser logs it, in any order.
     waits.until(f"{where}: {refused} refusals", lambda: len(asked()) >= refused)
     assert len(asked()) == refused, f"{where}: {asked()}"
     said = [m for m in said if "status of 4" not in m]

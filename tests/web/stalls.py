@@ -1,22 +1,22 @@
-"""In: a machine that other programs use too. Out: the longest that it let a program wait beyond what that asked for; trials of what has a limit of
-time, made again where the machine stood still in them, and nowhere else.
+"""In: a machine that other programs use too. Out: the longest time by which it delayed a sleeping program; repetition of tests
+with a time limit, only if the machine stalled during the test.
 Frame and unit: s."""
 
 import threading
 import time
 
-# What has a second's limit is not judged by a trial in which the machine stood still for so long.
+# Delay above which a trial does not count for a limit of one second.
 LONG = 0.5
 TRIALS = 10
 NAP = 0.02
 
 
 class Stalled(Exception):
-    """The machine stood still, and what was to be judged ended by its limit of time."""
+    """The machine stalled, and the trial failed because of a time limit."""
 
 
 class Meter:
-    """`longest` is the longest that a nap lasted too long since `clear`."""
+    """`longest` is the longest delay of a short sleep since `clear`."""
 
     def __init__(self):
         self.longest = 0.0
@@ -33,7 +33,7 @@ class Meter:
 
 
 def again(what, trial, clean=lambda: None):
-    """What a trial gives, the first in which nothing stalled; `clean` takes away what a stalled one left."""
+    """Result of the first trial without a stall, of at most `TRIALS`. `clean` removes what a stalled trial left."""
     for _ in range(TRIALS - 1):
         try:
             return trial()

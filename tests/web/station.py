@@ -1,6 +1,6 @@
-"""In: the program, a simulated station, a browser. Out: failure where the pages Touch, Station, Surface, Part, Scan and Health do not do what an
-operator expects: a square pose that is square, frames and links in the checks, recipes from drawings and grids, constructed points, pictures
-in the support file only where that is ticked.
+"""In: the program, a simulated station, a browser. Out: failure if the pages Touch, Station, Surface, Part, Scan and Health do
+not do what an operator expects: a correct square pose, frames and links in the checks, recipes from drawings and grids,
+constructed points, pictures in the support file only if the box is ticked.
 Frame and unit: mm, degrees."""
 
 import json
@@ -15,7 +15,7 @@ from server import Server
 from shots import quiet
 
 program, folder = sys.argv[1:3]
-# A tool 120 mm before the flange, its z back towards it (against the insertion), leaning by 3 degrees about x.
+# A tool 120 mm before the flange. Its z points back to the flange, against the insertion, and is tilted by 3 degrees about x.
 LEAN = math.radians(183)
 TOOL = [1, 0, 0, 5, 0, math.cos(LEAN), -math.sin(LEAN), -2, 0, math.sin(LEAN), math.cos(LEAN), 120, 0, 0, 0, 1]
 
@@ -25,7 +25,7 @@ def dot(a, b):
 
 
 def touch(s, b):
-    """The proposed pose is square to the surface that was touched, at the place where the tool stood, by the least turn."""
+    """The proposed pose is square to the touched surface, keeps the tool's position, and needs the smallest rotation."""
     b.page("touch")
     b.click("#touch")
     b.until("a proposal", "return document.querySelectorAll('[data-square] .figure').length >= 12")
@@ -35,10 +35,10 @@ def touch(s, b):
     tool, flange = q["tool"], q["flange"]
     z = [tool[k] for k in (2, 6, 10)]
     assert math.degrees(math.acos(min(1, dot(z, normal)))) < 1e-3, (z, normal)
-    # The flange with the tool on it is where the tool is said to be.
+    # The reported flange pose with the tool gives the reported tool pose.
     made = [[sum(flange[4 * i + k] * TOOL[4 * k + j] for k in range(4)) for j in range(4)] for i in range(3)]
     assert all(abs(made[i][j] - tool[4 * i + j]) < 1e-5 for i in range(3) for j in range(4)), (made, tool)
-    # Where it stood, from the recording itself.
+    # The pose before, from the recording.
     with open(os.path.join(folder, "surface", "poses.json")) as f:
         poses = json.load(f)
     last = poses["poses"][-1] if isinstance(poses, dict) else poses[-1]
@@ -67,7 +67,7 @@ def station(s, b):
     quiet(b, "station")
 
 
-# Mean brightness of what the map shows, once it is the same from one picture of the page to the next.
+# Mean brightness of the map, once it is equal in two successive frames of the page.
 BRIGHTNESS = """
   const c = document.querySelector('.map canvas'), now = () => {
     const d = c.width ? c.getContext('2d').getImageData(0, 0, c.width, c.height).data : [];
@@ -83,7 +83,7 @@ BRIGHTNESS = """
 
 
 def brightness(b, layer):
-    """Of the map once it shows this layer."""
+    """Mean brightness of the map once it shows this layer."""
     b.until(f"layer {layer}", "return document.querySelector(`[data-layer=${arguments[0]}]`).getAttribute('aria-pressed') === 'true'", layer)
     b.place(".map canvas")
     return b.run(BRIGHTNESS)
@@ -94,14 +94,14 @@ def surface(s, b):
     b.until("the map", "return document.querySelector('.map canvas')?.width > 300")
     height = brightness(b, "height")
     b.click("[data-layer=both]")
-    # The light that came back is less than all light nearly everywhere.
+    # Nearly everywhere the intensity is below its maximum, so that this layer is darker.
     both = brightness(b, "both")
     assert 0.2 * height < both < 0.95 * height, (height, both)
     quiet(b, "surface")
 
 
 def dxf(unit=4):
-    """Body and two rows of three contacts, as a drawing."""
+    """A drawing (DXF) of a body with two rows of contacts."""
     out = ["0", "SECTION", "2", "HEADER", "9", "$INSUNITS", "70", str(unit), "0", "ENDSEC", "0", "SECTION", "2", "ENTITIES"]
     out += ["0", "LWPOLYLINE", "8", "0", "90", "4", "70", "1"]
     for x, y in ((-15.24, -8.89), (15.24, -8.89), (15.24, 8.89), (-15.24, 8.89)):
@@ -113,7 +113,7 @@ def dxf(unit=4):
 
 
 def part(s, b):
-    """A drawing becomes a recipe that is found; points are constructed of its grid; the tool goes to one of them."""
+    """A drawing becomes a recipe whose part is found. Points are constructed from its grid, and one is chosen for the tool."""
     b.page("part")
     b.until("the map", "return document.querySelector('.map canvas')?.width > 300")
     script = """const [text, name] = arguments, e = document.getElementById('drawing'), d = new DataTransfer();
@@ -122,7 +122,7 @@ def part(s, b):
     b.click("#make-recipe")
     b.until("that the unit is not known", "return /unit/.test(document.querySelector('.problem')?.innerText ?? '')")
     b.run(script, dxf(), "socket.dxf")
-    # It is read in its own time; until then the former one is what a recipe is made of.
+    # The page reads the file asynchronously; until then a recipe would be made from the previous drawing.
     b.until("the other drawing", "return document.getElementById('drawing-name').value === 'socket'")
     b.click("#make-recipe")
     b.until("a part that was found by its drawing", "return /score/.test(document.getElementById('main').innerText) && document.querySelector('[data-point]')")
@@ -137,21 +137,21 @@ def part(s, b):
     points = s.json("POST", "/points", {"text": recipe["text"]})
     grid = next(p["name"] for p in points if p["kind"] == "grid")
     assert sum(p["kind"] == "shape" and p["name"].startswith(grid) for p in points) == 24, points
-    # A midpoint of the two corner pins, chosen for the tool.
+    # The midpoint of the two corner pins, chosen for the tool.
     choose = "const e = [...document.querySelectorAll('select')].find((x) => x.previousElementSibling?.innerText === arguments[0]); e.value = arguments[1]; e.dispatchEvent(new Event('change'))"
     b.run(choose, "Of", f"{grid}[1,1]")
     b.run(choose, "and", f"{grid}[12,2]")
     b.run("document.getElementById('point-name').value = 'middle'")
     b.click("#add-point")
     b.until("the point", "return document.querySelector('[data-point=middle]')")
-    # Chosen as the program reads the text: the list is made anew then.
+    # The choice is complete when the server has changed the text and the page has redrawn the list.
     b.run("const e = document.querySelector('[aria-label=\"Tool goes to middle\"]'); e.former = true; e.click()")
     b.until("that it is chosen", "const e = document.querySelector('[aria-label=\"Tool goes to middle\"]'); return e?.checked && !e.former")
     text = b.run("return document.querySelector('textarea').value")
     points = {p["name"]: p for p in s.json("POST", "/points", {"text": text})}
     corners = [points[f"{grid}[1,1]"]["at"], points[f"{grid}[12,2]"]["at"]]
     assert points["middle"]["chosen"] and all(abs(points["middle"]["at"][k] - (corners[0][k] + corners[1][k]) / 2) < 1e-9 for k in (0, 1)), points["middle"]
-    # An offset along the lattice; what it is built of cannot be taken away below it.
+    # An offset along the lattice; the point on which it depends cannot be deleted.
     b.run(choose, "Construct", "offset")
     b.run(choose, "Of", "middle")
     b.run("for (const [id, v] of [['by-along', 2.54], ['by-across', 1]]) { const e = document.getElementById(id); e.value = v; e.dispatchEvent(new Event('input')); }")
@@ -167,7 +167,7 @@ def part(s, b):
 
 
 def grid(s, b):
-    """Rows, columns and pitch make every hole of a grid, in the part's own turn."""
+    """Rows, columns and pitch give every hole of a grid, rotated with the part."""
     scan = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "scan")["id"]
     b.page("station")
     b.page("part")
@@ -190,7 +190,7 @@ def grid(s, b):
 
 
 def health(s, b):
-    """Pictures leave the station only where somebody ticked that."""
+    """The support file contains pictures only if the box is ticked."""
     b.page("health")
     address = lambda: b.run("return document.getElementById('support').getAttribute('href')")
     read = lambda: json.loads(s.ask("GET", address())[2])
@@ -232,7 +232,7 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         part(s, b)
         grid(s, b)
         health(s, b)
-        # A minute of a machine's time.
+        # Takes about a minute.
         if os.environ.get("SHEETLIGHT_LONG"):
             plan.health(program, s, b)
         plan.drawn(s, b, "led")

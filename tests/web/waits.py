@@ -1,5 +1,5 @@
-"""In: what has to become so. Out: it, as soon as it is; failure where it is not for longer than any machine takes that other programs use too.
-How long something may take is judged nowhere here: who judges that measures it.
+"""In: a condition. Out: its value as soon as it is true; failure if it stays false for longer than even a busy machine needs.
+This is no check of speed: a test of speed measures the time itself.
 Frame and unit: s."""
 
 import time
@@ -8,7 +8,7 @@ PATIENCE = 120
 
 
 def until(what, holds, seconds=PATIENCE):
-    """Asks again and again until it holds, and gives what it holds."""
+    """Calls `holds` repeatedly until it returns something true, and returns that. Fails after `seconds`."""
     end = time.monotonic() + seconds
     while not (value := holds()):
         assert time.monotonic() < end, f"{what}: not within {seconds} s: {value}"

@@ -1,6 +1,7 @@
 /*
- * In: points B (three 16-bit numbers each, in steps of STEP mm), heights LOW to HIGH (mm), their
- * colours MAP. Out: a picture of them that turns under the mouse. Nearer points cover those behind.
+ * In: points B (three 16-bit numbers each, in steps of STEP mm), heights LOW and HIGH that bound the
+ * colour scale (mm), and its 32 colours MAP. Out: a picture of the points that the mouse rotates.
+ * Nearer points cover those behind.
  */
 (() => {
   const bytes = Uint8Array.from(atob(B), (c) => c.charCodeAt(0));

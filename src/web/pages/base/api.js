@@ -3,11 +3,12 @@
 
 const ROOT = "/api/v1";
 
-/** A page that is stuck does not say that it lives under a name: it is waited for so long, ms. */
+/** Longest wait for a tab name, ms: a page that hangs keeps its name but does not answer. */
 const STUCK = 10000;
 /**
- * Takes a name for as long as this page lives; false where another page lives under it, which says
- * so. One that is being left says nothing, and its name is free in a moment.
+ * Reserves a tab name until this page closes. Resolves to false if another page answers that it has
+ * the name, or still holds it after `STUCK`. A page that is closing does not answer, and its lock
+ * is free a moment later.
  */
 const takes = (name) =>
   new Promise((done) => {
@@ -27,8 +28,8 @@ const takes = (name) =>
     setTimeout(() => lives.abort(), STUCK);
   });
 /**
- * This tab's name: it operates or watches by it, also after a reload. A copied tab gets one of its
- * own: two that share a name would hold one button.
+ * This tab's name, by which the server knows it; it survives a reload. A copied tab gets a new name,
+ * because two tabs with one name could both hold the same button.
  */
 export const tab = await (async () => {
   let name = sessionStorage.getItem("tab");
@@ -40,7 +41,7 @@ export const tab = await (async () => {
   return name;
 })();
 
-/** A fault of the server. */
+/** A fault that the server reported; status 0 if the server does not answer. */
 export class Problem extends Error {
   constructor(status, problem) {
     super(problem.what);
@@ -92,16 +93,16 @@ export const picture = (recording, frame, width, light) =>
   );
 
 let socket = null;
-/** Says something over the socket; false where it is not open. */
+/** Sends a text over the WebSocket; false if the socket is not open. */
 export function say(text) {
   if (socket?.readyState !== WebSocket.OPEN) return false;
   socket.send(text);
   return true;
 }
 /**
- * Listens to the server for as long as the page is open; opens the socket again where it breaks.
- * Done when the server has told how things stand, or the socket broke: a page that is drawn before
- * would say that there is nothing.
+ * Receives the server's events while the page is open, and reconnects when the socket closes.
+ * Resolves at the first message, which holds the whole state, or when the socket closes. A page
+ * that is drawn earlier would show that there are no jobs.
  */
 export const listen = ({ event, rows, lost }) =>
   new Promise((told) => {

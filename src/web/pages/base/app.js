@@ -8,7 +8,8 @@ import { bar } from "../widgets/bar.js";
 import { fault } from "../widgets/problem.js";
 
 /**
- * Pages in the order of a shift; each module has `show(place, query)`, which returns what ends it.
+ * Pages in the order in which a shift uses them. Each module exports `show(place, query)`, which
+ * returns a function that ends the page.
  */
 const PAGES = [
   "station",
@@ -65,7 +66,7 @@ async function page() {
   }
 }
 
-/** Built once: a link that has the focus keeps it. */
+/** Draws the navigation. The links are created once, so that a focused link keeps the focus. */
 function nav(current) {
   const place = document.getElementById("nav");
   if (!place.children.length)
@@ -89,7 +90,10 @@ function keys(e) {
   }
 }
 
-/** A session by the token behind #, by the cookie, or by a password. */
+/**
+ * Opens a session with the token behind `#`, or uses the session of the cookie. Throws if there is
+ * neither; `door` then asks for the password.
+ */
 async function enter() {
   const token = /[#&]token=([0-9a-f]+)/.exec(location.hash)?.[1];
   if (token) {

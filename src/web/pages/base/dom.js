@@ -1,6 +1,7 @@
 // In: names, properties, children. Out: elements; strings become text, never markup.
 
 /**
+ * Creates an HTML element; a property `on…` adds an event listener.
  * @template {keyof HTMLElementTagNameMap} T
  * @param {T} tag
  * @param {Record<string, any>} [props]
@@ -19,7 +20,7 @@ export function h(tag, props = {}, ...children) {
   return e;
 }
 
-/** The same for SVG. */
+/** Creates an SVG element. */
 export function svg(tag, props = {}, ...children) {
   const e = document.createElementNS("http://www.w3.org/2000/svg", tag);
   for (const [k, v] of Object.entries(props)) if (v !== undefined) e.setAttribute(k, String(v));
@@ -27,7 +28,7 @@ export function svg(tag, props = {}, ...children) {
   return e;
 }
 
-/** What a selector finds below an element, as elements of a page. @returns {HTMLElement[]} */
+/** All elements below `root` that match a selector. @returns {HTMLElement[]} */
 export const all = (root, selector) => [...root.querySelectorAll(selector)];
 
 const asNode = (c) => (c instanceof Node ? c : document.createTextNode(String(c)));
@@ -41,7 +42,7 @@ function set(e, props) {
   }
 }
 
-/** Puts children in the place of what is there. */
+/** Replaces the children of an element. */
 export function fill(e, ...children) {
   e.replaceChildren(
     ...children
@@ -52,13 +53,13 @@ export function fill(e, ...children) {
   return e;
 }
 
-/** A number for people: so many digits after the point, a dash where there is none. */
+/** A number as text: `digits` digits after the point, or a dash if there is no finite number. */
 export function num(value, digits = 3, unit = "") {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   return value.toFixed(digits) + (unit ? "\u00a0" + unit : "");
 }
 
-/** A number with its standard deviation, in as many digits as that bears. */
+/** A value ± its standard deviation, rounded to two significant digits of the deviation. */
 export function withSigma(value, sigma, unit) {
   if (!Number.isFinite(value)) return "–";
   const digits = sigma > 0 ? Math.min(5, Math.max(0, 1 - Math.floor(Math.log10(sigma)))) : 3;

@@ -8,13 +8,16 @@ export const store = {
   /** @type {Bar | null} */ bar: null,
   /** @type {Map<string, Job>} */ jobs: new Map(),
   /** @type {import("../../../../docs/messages").MotionState | null} */ motion: null,
-  /** The scan that grows: { job, columns, total, done, heights }. */ growing: null,
-  /** false, true, or "over" where the session ended. */ lost: false,
+  /** Height map of the running scan: { job, columns, total, done, heights }. */ growing: null,
+  /** Whether the connection is lost; "over" if the session has ended. */ lost: false,
 };
 
 const ears = new Map();
 
-/** Calls `hear` at each `what` (bar, jobs, motion, rows, lost). Returns what ends it. */
+/**
+ * Calls `hear` at each event `what`: bar, jobs, motion, rows, lost, problem, stop. Returns a
+ * function that removes the listener.
+ */
 export function on(what, hear) {
   if (!ears.has(what)) ears.set(what, new Set());
   ears.get(what).add(hear);
@@ -25,7 +28,7 @@ export function tell(what, value) {
   for (const hear of [...(ears.get(what) ?? [])]) hear(value);
 }
 
-/** Newest first; those that `keep` wants. @param {(job: Job) => boolean} keep */
+/** The jobs for which `keep` is true, newest first. @param {(job: Job) => boolean} keep */
 export function jobs(keep = () => true) {
   return [...store.jobs.values()].filter(keep).sort((a, b) => (a.id < b.id ? 1 : -1));
 }
@@ -37,7 +40,7 @@ export function jobs(keep = () => true) {
  */
 export const done = (procedure) =>
   /** @type {any} */ (jobs((j) => j.order.procedure === procedure && j.state === "done"));
-/** Finished scans, filtered ones too. */
+/** Finished scans, including filtered ones, newest first. */
 export const scans = () =>
   jobs((j) => ["scan", "filter"].includes(j.order.procedure) && j.state === "done");
 export const busy = () => jobs((j) => j.state === "running" || j.state === "queued").length > 0;
@@ -72,7 +75,7 @@ export function take(event) {
   }
 }
 
-/** Rows of a growing map (src/web/event/growing.rs). */
+/** Stores received rows of the running scan's height map (src/web/event/growing.rs). */
 export function takeRows(buffer) {
   const [, job, columns, total, from, rows] = new Uint32Array(buffer, 0, 6);
   if (!store.growing || store.growing.job !== job || from === 0) {

@@ -34,7 +34,7 @@ export function setTheme(name) {
   apply();
 }
 
-/** Puts language and colours onto the document. */
+/** Sets the language and the colour theme of the document. */
 export function apply() {
   document.documentElement.lang = language();
   const light =

@@ -253,7 +253,7 @@ export async function show(place, query) {
     );
     corners(r);
   }
-  /** Which corners were found in each picture, one after the other; gauges of what they cover. */
+  /** Loads the corners of each picture in turn, draws them, and adds them to the gauges. */
   async function corners(r) {
     const mine = ++looks;
     seen.clear();

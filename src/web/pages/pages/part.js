@@ -32,7 +32,7 @@ export async function show(place, query) {
     );
   let recipes = await get("/recipes");
   const first = () => (recipes.find((r) => !r.problem) ?? recipes[0])?.name;
-  /** Whether the station has a recipe of its own under that name. */
+  /** Whether the station itself, not only the program, has a recipe of that name. */
   const taken = (n) => recipes.some((r) => r.name === n && !r.shipped);
   let name = sessionStorage.getItem("recipe");
   if (!recipes.some((r) => r.name === name)) name = first();
@@ -339,7 +339,7 @@ export async function show(place, query) {
       one(t("Pitch across, mm"), g.pitch[1], 0.01, 0.1, (v) => (g.pitch[1] = v), "grid-y"),
     );
   };
-  /** A recipe from a drawing: it is looked for at once, in the scan that is shown. */
+  /** Makes a recipe from a drawing, then searches for its part in the scan that is shown. */
   const made = drawing(problem, taken, async (read) => {
     recipes = await get("/recipes");
     name = read.recipe.name;
@@ -349,7 +349,7 @@ export async function show(place, query) {
     find();
   });
   let points = null;
-  /** Constructed points where the part was found: part frame onto the map. */
+  /** Shows the constructed points on the map, at the pose where the part was found. */
   function pointMarks(list) {
     built = list;
     marks();
@@ -463,7 +463,7 @@ export async function show(place, query) {
   };
 }
 
-/** A name that no recipe has yet. */
+/** A name that no recipe of the station has yet. */
 function freeName(taken) {
   for (let k = 1; ; k++) {
     const name = k === 1 ? "part" : `part ${k}`;
@@ -471,7 +471,7 @@ function freeName(taken) {
   }
 }
 
-/** Places of the part's frame on the map, mm. */
+/** A function from a point of the part frame to the map, mm. */
 function onMap(part, grid) {
   return ([x, y]) => {
     const base = [0, 1, 2].map(
@@ -481,7 +481,7 @@ function onMap(part, grid) {
   };
 }
 
-/** Corners of a box that is turned about its middle, degrees from x towards y. */
+/** Closed outline of a box rotated about its centre; degrees from x towards y. */
 function turned([x0, y0, x1, y1], degrees) {
   const [cx, cy] = [(x0 + x1) / 2, (y0 + y1) / 2],
     c = Math.cos((degrees * Math.PI) / 180),

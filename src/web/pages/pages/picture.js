@@ -13,7 +13,7 @@ import { attempt } from "../widgets/problem.js";
 import { region } from "../widgets/rig/region.js";
 import { stripe } from "../widgets/rig/stripe.js";
 
-/** Fates of peaks by number (src/stages/peak/found.rs): word and colour. */
+/** Results of the peak checks by number (src/stages/peak/found.rs): word and colour. */
 const FATES = [
   ["kept", "#3ddc84"],
   ["outside the working volume", "#5aa9ff"],
@@ -27,14 +27,15 @@ const FATES = [
   ["no point", "#7fd6d6"],
 ];
 
-/** A picture that is drawn in less than this leaves the machine its time, ms. */
+/** Drawing time of a picture above which the page pauses before the next picture, ms. */
 const FLUENT = 15;
-/** Browsers on the station itself. */
+/** Whether this browser runs on the station itself. */
 const HERE = ["localhost", "127.0.0.1", "[::1]"].includes(location.hostname);
 /**
- * Between two pictures while a job runs, ms. A browser without a GPU spends some 20 ms of a core on
- * each, which a scan on all cores lacks (tests/web/rates.py): all that look on from the station
- * itself have two a second among them. Elsewhere a picture costs the station its measuring alone.
+ * Shortest time between two pictures while a job runs, ms. A browser without a GPU uses about 20 ms
+ * of one core for each picture, which a scan on all cores lacks (tests/web/rates.py). A browser on
+ * the station waits 500 ms for each connected viewer, at most 2 s. For any other browser the station
+ * only measures the picture.
  */
 const beside = () => (HERE ? Math.min(2000, 500 * (store.bar?.viewers ?? 1)) : 250);
 
@@ -129,7 +130,7 @@ export async function show(place) {
       if (mine === turn) stripe(seen, look);
     }, problem);
   }
-  /** The newest picture, again and again; one that is slow gets fewer. */
+  /** Shows the newest picture repeatedly; a slow browser shows fewer pictures. */
   async function live() {
     const mine = ++turn;
     let number = 0;
@@ -186,8 +187,8 @@ export async function show(place) {
     }
   }
   /**
-   * What the newest picture shows is reckoned where the pictures are: once in a while is enough for
-   * people.
+   * The server computes the figures of the stripe from the newest picture; people need them only
+   * every 1.5 s.
    */
   const looks = setInterval(async () => {
     if (r || !camera || document.hidden || store.bar?.running) return;

@@ -24,7 +24,7 @@ import { cloud } from "../widgets/view/cloud.js";
 import { livePicture } from "../widgets/view/live.js";
 
 const moves = (j) => j.order.procedure === "insert";
-/** Jobs that found a position: in a scan, or with the robot. */
+/** The found position of a job, in a scan or with the robot; null if the job found none. */
 const found = (j) =>
   j.state === "done" && j.order.procedure === "find"
     ? j.outcome
@@ -76,7 +76,7 @@ export async function show(place, query) {
   };
 }
 
-/** The found part over its scan, from above or in three dimensions. */
+/** Shows the found part over its scan, as a map or in three dimensions. */
 async function seen(place, job) {
   const flat = h("div", { class: "stack grow" }),
     deep = h("div", { class: "stack grow", hidden: true }),
@@ -118,8 +118,8 @@ async function seen(place, job) {
 }
 
 /**
- * The job whose part is drawn over the live picture: the one that asks for a motion at the part,
- * else the one whose position is shown.
+ * The job whose part is drawn over the live picture: the job that asks for a motion at the part,
+ * otherwise the job whose position is shown. Null while another job runs.
  */
 const drawn = (shown) =>
   ["approach", "insert", "retract"].includes(store.motion?.asked?.step)
@@ -133,7 +133,7 @@ const words = (j) =>
   (j.order.scans ? ` · ${j.order.scans.join(" + ")}` : "") +
   (found(j).passed ? "" : ` · ${t("refused")}`);
 
-/** Recipe, arming, start; what waits; how far the job is. */
+/** Panel of an insertion: recipe, arming, start, the motion to confirm, progress of the job. */
 async function insertion(named, job) {
   const recipes = await known(),
     simulated = store.motion.simulated;
@@ -263,7 +263,7 @@ async function insertion(named, job) {
   return { panel: panel_, ends };
 }
 
-/** The pose with its sigma, gates, sources. */
+/** Shows the pose with its standard deviation, its sources of uncertainty, and the gates. */
 function pose(place, job, picture) {
   const p = found(job),
     poses = p.poses,
@@ -393,7 +393,7 @@ function pose(place, job, picture) {
   draw();
 }
 
-/** A bar against a third of the tolerance, because three sigma must stay within it. */
+/** A bar of sigma with a mark at a third of the tolerance: three sigma must stay within it. */
 function sigma(name, value, tolerance, unit) {
   const full = tolerance / 2,
     x = Math.min(100, (100 * value) / full),

@@ -326,7 +326,7 @@ function result(j) {
   return o.verdict ? t(o.verdict) : (o.recipe ?? "");
 }
 
-/** B less A on A's cells: B's height where it has a cell at the same place of the common frame. */
+/** B minus A in the cells of A: B's height in the cell that contains A's point in the base frame. */
 function difference(one, two) {
   const { width, height, cell_mm, base_from_grid: A } = one.head,
     B = two.head.base_from_grid,

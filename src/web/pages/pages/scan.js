@@ -61,7 +61,7 @@ export async function show(place, query) {
         ),
       ),
     );
-  /** The same recording with the same settings once more. */
+  /** Scans the same recording again with the same settings. */
   const repeat = (j) =>
     attempt(async () => {
       const again = await order(j.order);

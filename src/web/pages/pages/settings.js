@@ -26,7 +26,7 @@ export async function show(place) {
     form = h("div", { class: "stack" }),
     text = h("div", { class: "stack" }),
     kept = h("div", { class: "stack" });
-  /** What changes the station: by who operates, and shown again as it stands then. */
+  /** Changes the station: takes the lease first, and shows the settings again afterwards. */
   const change = (what, said) =>
     attempt(async () => {
       saved.textContent = "";
@@ -147,7 +147,7 @@ export async function show(place) {
   return tryOutputs(outputs);
 }
 
-/** Backups: made by hand and before each change; each can be taken away or come back. */
+/** Backups, made by hand and before each change; each can be downloaded or restored. */
 function backups(place, now, change) {
   let sure = null;
   const list = h("div");
@@ -221,8 +221,8 @@ function backups(place, now, change) {
 }
 
 /**
- * Each output of the controller, tried by hand: a laser lights for a moment. The gripper opens at
- * the second press alone.
+ * Buttons that try each output of the robot's controller. A laser is switched on for a moment. The
+ * gripper opens only at the second press.
  */
 function tryOutputs(place) {
   const armed = h("div", { class: "stack" }),

@@ -84,7 +84,7 @@ export async function show(place, query) {
       ),
     );
   }
-  /** Where the robot goes to stand square: numbers for its pendant, as it writes them. */
+  /** Shows the square pose in the notation of the robot, for entry at its pendant. */
   function square(q) {
     if (!q)
       return panel(

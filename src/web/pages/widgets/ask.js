@@ -9,12 +9,12 @@ import { operate, operating } from "./bar.js";
 import { attempt, fault } from "./problem.js";
 import { figure, panel } from "./parts.js";
 
-/** Held so long before anything moves, ms (src/web/motion/grants.rs asks for 0.8 s). */
+/** Time that the button is held before a motion starts, ms (grants.rs requires 0.8 s). */
 const HELD = 900;
-/** While it is held that is said so often, ms; a second of silence halts. */
+/** Interval at which the page reports a held button, ms; a second without a report halts the arm. */
 const SAY = 150;
 
-/** Arm, give back, I have looked: what stands before every motion. */
+/** Buttons that must come before a motion: arm the robot or give it back, "I have looked". */
 export function arming(place) {
   const said = h("div");
   const act = (path, body) =>
@@ -83,7 +83,7 @@ export function arming(place) {
   return () => offs.forEach((off) => off());
 }
 
-/** The motion that waits, and the button. */
+/** Shows the motion that waits for confirmation, and the button that confirms it. */
 export function ask(place) {
   const shown = h("div", { class: "stack" }),
     said = h("div", { role: "status" }),
@@ -262,7 +262,7 @@ export function gate(g) {
   );
 }
 
-/** In the simulated cell: which component is in the gripper, where the arm was jogged. */
+/** Buttons of the simulated cell: the component in the gripper, and where the arm is jogged to. */
 export function inTheCell(place, overBoard, changed) {
   let before = null;
   const draw = () => {

@@ -14,10 +14,10 @@ const ROBOT = {
   moving: ["moving", "poor"],
 };
 
-/** Whether this tab operates. */
+/** Whether this tab holds the lease. */
 export const operating = () => store.bar?.lease.holder === tab.slice(0, 4);
 
-/** Takes the lease where nobody has it, so that an operator need not think of it. */
+/** Takes the lease if no other tab holds it; with `firmly` also from another tab. */
 export async function operate(firmly = false) {
   await post("/lease", { firmly });
 }
@@ -136,7 +136,7 @@ function cell(name, value, title = "", mark = "") {
 
 const age = (days) => (days < 1 ? t("today") : `${Math.round(days)} d`);
 
-/** Where a job is looked at. */
+/** The page that shows a job of this kind. */
 export function pageOf(job) {
   return {
     check: "station",

@@ -24,7 +24,7 @@ export const figures = (...list) =>
 export const panel = (name, ...children) =>
   h("section", { class: "panel" }, name && h("h2", {}, name), children);
 
-/** A table: heads beginning with # are numbers. */
+/** A table; a head that begins with # marks a column of numbers. */
 export function table(heads, rows) {
   const numeric = heads.map((x) => x.startsWith("#"));
   return h(
@@ -60,7 +60,7 @@ export function table(heads, rows) {
 }
 
 let counter = 0;
-/** A labelled choice: [value, words] each. */
+/** A labelled choice; `list` holds pairs [value, words]. */
 export function choice(name, list, current, changed) {
   const id = `choice${++counter}`;
   const select = h(
@@ -82,8 +82,8 @@ export function field(name, props, unit = "") {
 }
 
 /**
- * A button that stores something under a name. One that is taken is replaced at the second press
- * alone. `taken(name)`: whether something of that name is there; `store(name, replace)`.
+ * A button that calls `store(name, replace)`. If `taken(name)` says that the name exists already,
+ * only the second press stores and replaces.
  */
 export function storing(words, props, { name, taken, store: keep }) {
   let sure = null;
@@ -105,11 +105,12 @@ export function storing(words, props, { name, taken, store: keep }) {
   return button;
 }
 
-/** Recipes that can be read. */
+/** Recipes without a problem. */
 export const recipes = async () => (await get("/recipes")).filter((r) => !r.problem);
 
 /**
- * Finished scans, newest first; the one that the address names, else the newest.
+ * A choice of the finished scans, newest first, and the current scan: the scan that the address or
+ * this session names, otherwise the newest.
  * @returns {[HTMLElement, import("../../../../tools/pages/types").AnyJob | undefined]}
  */
 export function scanChoice(query, changed) {
@@ -136,11 +137,11 @@ export function scanChoice(query, changed) {
 export const nothing = (what, page, words) =>
   h("div", { class: "panel" }, h("p", {}, what), h("a", { href: `#/${page}` }, words));
 
-/** Recordings that a page can use. */
+/** Readable recordings for which `keep` is true. */
 export const recordings = async (keep) =>
   (await get("/recordings")).filter((r) => !r.problem && keep(r));
 
-/** Recordings as pictures to choose from. */
+/** Shows recordings as pictures; a click chooses one. */
 export function gallery(list, current, chosen) {
   return h(
     "div",
@@ -157,7 +158,7 @@ export function gallery(list, current, chosen) {
   );
 }
 
-/** Orders a procedure from this tab; takes the lease where nobody has it. */
+/** Orders a procedure from this tab; takes the lease first if no other tab holds it. */
 export async function order(what) {
   if (!operating()) await operate(false);
   const job = await post("/jobs", what);
@@ -166,7 +167,7 @@ export async function order(what) {
   return job;
 }
 
-/** How a job without a result ended, in the language of the page. */
+/** How a job without a result ended, in the page's language. */
 const endedAs = (state) =>
   t(
     {
@@ -176,7 +177,7 @@ const endedAs = (state) =>
     }[state],
   );
 
-/** Shows how far a job is, then what it came to. `ended` is called once when it is done. */
+/** Shows the progress of a job, then how it ended. `ended(job)` is called when the job is done. */
 export function follow(place, id, ended) {
   let over = false;
   const draw = () => {
@@ -254,7 +255,7 @@ export function follow(place, id, ended) {
   return off;
 }
 
-/** What every scan says of itself. */
+/** The figures that every scan reports. */
 export function scanFigures(f) {
   return figures(
     [thousands(f.points), t("points")],

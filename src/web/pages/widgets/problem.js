@@ -4,7 +4,7 @@ import { fill, h } from "../base/dom.js";
 import { t } from "../base/text.js";
 import { on } from "../base/store.js";
 
-/** Beside what it belongs to. */
+/** An element that shows a fault, for use beside the place where it happened. */
 export function fault(e) {
   const p = e.problem ?? e;
   if (!p.what) console.warn(e);
@@ -25,7 +25,7 @@ on("problem", (e) => {
   if (toast.children.length > 3) toast.firstChild.remove();
 });
 
-/** Runs what a button does; its fault appears in `place`, or in the corner. */
+/** Runs the action of a button. A fault is shown in `place`, or in the corner without `place`. */
 export async function attempt(what, place) {
   if (place) fill(place);
   try {

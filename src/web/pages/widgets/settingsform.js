@@ -5,7 +5,7 @@ import { fill, h } from "../base/dom.js";
 import { t } from "../base/text.js";
 import { choice, field, table } from "./parts.js";
 
-/** Names with dots, words, unit; a star: only where the station has that table. */
+/** Settings that are numbers: name with dots, words, unit. */
 const NUMBERS = [
   ["tolerance_mm", "The work tolerates", "mm"],
   ["working_volume.near_mm", "Working volume from", "mm"],
@@ -22,13 +22,13 @@ const NUMBERS = [
   ["outputs.gripper", "Output of the gripper", ""],
 ];
 
-/** Where the camera is; calibrations of its place go by it. */
+/** Where the camera is mounted; the calibrations of its pose depend on it. */
 export const MOUNTS = {
   "eye-in-hand": "on the flange",
   "eye-to-hand": "beside the robot, it stands still",
 };
 
-/** Fills `place`; `save(changes)` hears names and values, null where a field was emptied. */
+/** Fills `place`; `save(changes)` receives names and new values, null for an emptied field. */
 export function settingsForm(place, now, save) {
   const { values } = now,
     changes = {},

@@ -8,10 +8,13 @@ import { t } from "../../base/text.js";
 import { choice, order, recipes as known, recordings, table } from "../parts.js";
 import { attempt } from "../problem.js";
 
-/** Pairs of jobs that the server lets wait. */
+/** Most recordings of a batch: two jobs each, and the server queues 32 jobs. */
 const MOST = 15;
 
-/** Fills `place`; `settings()` are those that differ from the station's. Returns what ends it. */
+/**
+ * Fills `place`; `settings()` returns the settings that differ from the station's. Returns a function
+ * that ends it.
+ */
 export async function batch(place, settings, problem) {
   const [list, recipes] = [
     await recordings((r) => r.beam !== "pointer" && !r.board),
@@ -98,7 +101,7 @@ export async function batch(place, settings, problem) {
 const NAMES = { x: "x", y: "y", z: "z", turn: "Turn" },
   UNITS = { mm: "mm", degrees: "°" };
 
-/** What the program reckons of them, as `sheetlight batch` does. */
+/** Shows the scatter of the poses, which the server computes as `sheetlight batch` does. */
 function spread(r) {
   if (r.places < 2)
     return h(

@@ -9,15 +9,15 @@ import { choice, field, table } from "../parts.js";
 const KINDS = { midpoint: "Midpoint", line: "Line", offset: "Offset", lattice: "Lattice" };
 
 /**
- * `recipe.text()` and `recipe.write(text)` are the editor's; `recipe.shown(points)` hears of the
- * points, `recipe.say(fault)` of what is wrong.
+ * `recipe.text()` and `recipe.write(text)` read and write the editor's text. `recipe.shown(points)`
+ * receives the constructed points, `recipe.say(fault)` the fault of a request.
  */
 export function constructions(place, recipe) {
   let points = [],
     kind = "midpoint",
     turn = 0;
   const now = { of: [], along: "", by: [0, 0] };
-  /** Asks the program; only the newest answer counts. */
+  /** Sends a request to the server; only the answer to the newest request is used. */
   const ask = async (what, taken) => {
     const mine = ++turn;
     try {

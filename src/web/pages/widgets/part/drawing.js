@@ -9,12 +9,12 @@ import { choice, field, panel, storing } from "../parts.js";
 import { attempt } from "../problem.js";
 
 const UNITS = ["mm", "inch", "cm", "m", "um", "mil", "foot"];
-/** The server takes requests of 1 MiB. */
+/** Largest drawing, bytes: the server accepts requests of up to 1 MiB. */
 const LARGEST = 1000000;
 
 /**
- * `taken(name)`: whether the station has such a recipe; `made(read)` hears of a recipe that was
- * made.
+ * `taken(name)`: whether the station has a recipe of that name. `made(read)` is called with the
+ * server's answer after a recipe was made.
  */
 export function drawing(problem, taken, made) {
   let text = null,

@@ -8,7 +8,7 @@ import { operate, operating } from "../bar.js";
 import { field, follow, order } from "../parts.js";
 import { attempt } from "../problem.js";
 
-/** A filter in words. */
+/** A short description of a filter. */
 function words(f) {
   const box =
     f.corners &&
@@ -28,8 +28,8 @@ function words(f) {
 }
 
 /**
- * Shows them in `place`; `changed()` after each change, `saved(job)` when the filtered scan is
- * made. `tools` gets what draws boxes.
+ * Shows the filters in `place`. Calls `changed()` after each change, and `saved(job)` when the
+ * filtered scan is finished. Returns `cut` and `keep`, the map tools that draw boxes, and `end()`.
  */
 export async function filters(place, id, head, { changed, saved, problem }) {
   let now = await get(`/scans/${id}/filters`),

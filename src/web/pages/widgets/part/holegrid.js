@@ -1,7 +1,7 @@
 // In: a grid's first hole, its columns, rows and pitch, the part's rotation. Out: centre and
 // radius of every hole, mm in the map.
 
-/** Columns go along the part's x, rows along its y; degrees from x towards y. */
+/** Columns go along the part's x, rows along its y; the rotation is in degrees from x towards y. */
 export function places({ first, radius, columns, rows, pitch }, degrees) {
   const c = Math.cos((degrees * Math.PI) / 180),
     s = Math.sin((degrees * Math.PI) / 180),

@@ -10,9 +10,9 @@ import { livePicture } from "../view/live.js";
 import { choice, field, figures, recipes as known, table } from "../parts.js";
 import { fault } from "../problem.js";
 
-/** Without these nothing says where the line goes. */
+/** Calibrations without which the path of the laser line is unknown. */
 const NEEDED = ["camera", "laser_plane", "hand_eye"];
-/** A robot that is jogged takes the sweep along: looked at again after so long, ms. */
+/** Shortest time between two updates of the plan, ms: the sweep moves with a jogged robot. */
 const AGAIN = 3000;
 /** @type {[string, string, string, number][]} */
 const FIELDS = [
@@ -28,7 +28,7 @@ const LIMITS = {
   speed: "the station's limit of speed",
 };
 
-/** Fills `place`; returns what ends it. */
+/** Fills `place`; returns a function that ends it. */
 export async function sweep(place) {
   const [info, recipes] = [await get("/station"), await known()];
   if (!recipes.length || NEEDED.some((k) => !info.calibrations.some((c) => c.kind === k)))
@@ -131,8 +131,8 @@ export async function sweep(place) {
 }
 
 /**
- * The board as the camera sees it from its square place, mm: field, what is swept, the part however
- * it is turned, where its middle may lie.
+ * The board as the camera sees it from its square pose, mm: field of view, swept area, a circle that
+ * contains the part in any rotation, and the area in which the part's centre may lie.
  */
 function picture(p) {
   const [x0, y0, x1, y1] = p.field_mm,
@@ -190,7 +190,7 @@ function picture(p) {
   );
 }
 
-/** The same in the camera's picture as it stands now. */
+/** Draws swept area and part into the live picture, at the camera's current pose. */
 function over(g, p, width) {
   const [swept, round] = p.seen_px;
   if (!swept) return;

@@ -10,7 +10,10 @@ import { livePicture } from "../view/live.js";
 import { choice, follow, order, panel } from "../parts.js";
 import { attempt } from "../problem.js";
 
-/** Shows it in `place`; `done(job)` hears of the finished job. Returns what ends it. */
+/**
+ * Shows an automatic calibration in `place`; `done(job)` receives the finished job. Returns a
+ * function that ends it.
+ */
 export function byTheRobot(place, done) {
   const problem = h("div"),
     progress = h("div"),
@@ -119,7 +122,7 @@ export function byTheRobot(place, done) {
   return () => ends.forEach((end) => end());
 }
 
-/** The expected error after each stop on a logarithmic scale, and the target. */
+/** A curve of the expected error after each stop, on a logarithmic scale, with the target. */
 function falling(points, target) {
   if (!points.length)
     return h("p", { class: "quiet small" }, t("The first small moves tell nothing yet."));
@@ -160,7 +163,7 @@ function falling(points, target) {
   );
 }
 
-/** The newest pictures of a job with their corners. */
+/** Shows the six newest pictures of a job with their corners. */
 async function views(place, id) {
   const list = await get(`/jobs/${id}/views`).catch(() => []);
   fill(

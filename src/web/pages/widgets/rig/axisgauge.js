@@ -4,12 +4,12 @@
 import { fill, h, num, svg, thousands } from "../../base/dom.js";
 import { t } from "../../base/text.js";
 
-/** As many stops tell an axis from its noise. */
+/** Number of stops below which the gauge asks for more. */
 const WANTED = 8;
 
 /**
- * The middle of the widest gap between neighbouring stops, off the middle a little: even stops hide
- * counts of another picture.
+ * A count a little below the middle of the widest gap between neighbouring stops. Evenly spaced
+ * stops would hide counts that were assigned to the wrong pictures.
  */
 export function widest(counts) {
   const s = [...counts].sort((a, b) => a - b);

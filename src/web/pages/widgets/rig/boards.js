@@ -4,15 +4,15 @@
 import { fill, h, svg } from "../../base/dom.js";
 import { t } from "../../base/text.js";
 
-/** Places of the picture that are counted, as the camera's calibration counts them. */
+/** Cells into which the picture is divided, as in the camera's calibration. */
 const COLUMNS = 8,
   ROWS = 6;
-/** The board is to fill so many of them. */
+/** Cells that the board should fill. */
 const WIDE = 4,
   HIGH = 3;
 /**
- * How far the board should lean, degrees: less tells little of the focal length, more blurs the
- * corners.
+ * Tilt that the board should have, degrees. A smaller tilt determines the focal length poorly, a
+ * larger one blurs the corners.
  */
 const LEAN = 30;
 /** @type {[string, number, number][]} */
@@ -31,7 +31,7 @@ const WORDS = {
   up: "its front turned up",
 };
 
-/** What a set of views lacks most: a box, as shares of the picture, and a way to lean. */
+/** What a set of views lacks most: a box, in fractions of the picture, and a tilt direction. */
 export function next(views) {
   const count = new Array(COLUMNS * ROWS).fill(0);
   for (const v of views)
@@ -67,11 +67,11 @@ export function next(views) {
   };
 }
 
-/** The steepest of some leans, as a text. */
+/** The largest of some tilts, as text. */
 const steepest = (leans) =>
   leans.length ? `${Math.round(Math.max(...leans.map(([a, b]) => Math.hypot(a, b))))}°` : "–";
 
-/** Two gauges and a sentence; `add(view)` fills them. */
+/** Gauges of coverage and tilt, and advice for the next picture; `add(view)` updates them. */
 export function gauges(place) {
   let views = [];
   const draw = () => {
@@ -168,7 +168,7 @@ export function gauges(place) {
       views = [];
       draw();
     },
-    /** Draws the box into a picture of the camera. */
+    /** Draws the box for the next board into a picture of the camera. */
     mark(g, width, height) {
       const [x, y, w, high] = next(views).box;
       g.setLineDash([12, 8]);

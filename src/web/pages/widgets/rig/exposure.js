@@ -9,8 +9,8 @@ import { choice, field, follow, order } from "../parts.js";
 import { attempt } from "../problem.js";
 
 /**
- * What has a handle of its own, in this order; the second name is that of cameras from before the
- * standard's second version.
+ * Settings that have a slider, in this order. The second name is the one that cameras use from
+ * before the second version of the standard.
  */
 const HANDLES = [
   ["Exposure", ["ExposureTime", "ExposureTimeAbs"]],
@@ -83,7 +83,7 @@ export async function exposure(place, progress, problem) {
   };
 }
 
-/** A setting by handle: over a wide range each step is a share of the value, as light is seen. */
+/** A slider for a setting; logarithmic if the range is wide, because light is perceived so. */
 function handle(words, f, set) {
   const [low, high] = f.range,
     wide = low > 0 && high / low > 100;

@@ -9,7 +9,7 @@ import { attempt } from "../problem.js";
 
 const WHOLE = [0, 0, 1, 1],
   KEY = "extraction.region";
-/** Grips by what they move: -1 left or top, 1 right or bottom, 0 neither. */
+/** Grips by the edges that they move, in x and y: -1 left or top, 1 right or bottom, 0 neither. */
 const GRIPS = [
   [-1, -1],
   [0, -1],
@@ -20,7 +20,7 @@ const GRIPS = [
   [-1, 1],
   [-1, 0],
 ];
-/** Least width and height, and a step of an arrow key, share of the picture. */
+/** Least width and height, and step of an arrow key, as fractions of the picture. */
 const LEAST = 0.02,
   STEP = 0.01;
 

@@ -35,7 +35,7 @@ export function stripe(place, look) {
   );
 }
 
-/** One figure along the stripe; pieces that are dark are shaded by how much of them is. */
+/** A curve of one figure along the stripe; a piece is shaded in proportion to its dark part. */
 function curve(pieces, k, name, most, says) {
   const values = pieces.map((p) => p[k]),
     high = most ?? Math.max(1, ...values) * 1.1,

@@ -10,7 +10,7 @@ import { span } from "./colour.js";
 
 const FIRST = 150000,
   MOST = 2000000;
-/** A frame that takes longer than this has too many points, ms: of 33 the page needs its part. */
+/** Target time to draw a frame, ms: the rest of the 33 ms at 30 frames a second is for the page. */
 const FRAME = 22;
 
 const VERTEX = `#version 300 es
@@ -37,7 +37,7 @@ in vec3 place; uniform mat4 view; void main() { gl_Position = view * vec4(place,
 const INK = `#version 300 es
 precision mediump float; uniform vec4 ink; out vec4 seen; void main() { seen = ink; }`;
 
-/** `lines`: outlines in the cloud's frame, mm, that lie over the points. */
+/** Shows a scan's points in `place`; `lines` are outlines drawn over them, in its frame, mm. */
 export async function cloud(place, id, lines = []) {
   const canvas = h("canvas", {
     tabindex: "0",
@@ -228,8 +228,8 @@ export async function cloud(place, id, lines = []) {
           `σ ${num(data.f[5 * p + 3], 4)} mm`);
   };
   /**
-   * The drawn point nearest to a place on the screen, the nearest to the eye among those within a
-   * finger.
+   * The loaded point at a position on the screen: of the points within 9 CSS px, roughly the one that
+   * is nearest to the viewer.
    */
   const pick = (px, py) => {
     const m = matrix(),
@@ -374,8 +374,8 @@ async function load(id, most) {
 }
 
 /**
- * Lines over the points: where points hide them they show faintly, because a found part lies in its
- * own surface.
+ * Lines over the points. Where points hide a line it is drawn faintly, because the outline of a
+ * found part lies in the measured surface.
  */
 function outlines(gl, lines, origin) {
   const ends = lines.flatMap((line) =>

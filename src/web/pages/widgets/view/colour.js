@@ -43,8 +43,8 @@ export const SCALES = {
 };
 
 /**
- * Colours a field of numbers; NaN is the ground. With `cell` heights are shaded by light from the
- * upper left; with `lit`, a share of full light for each cell, by that.
+ * Colours a grid of numbers; NaN gets the background colour. With `lit`, the brightness of each cell
+ * is `lit(index)`. Otherwise, with `cell` (mm), heights are shaded by light from the upper left.
  */
 export function paint(values, width, height, [low, high], scale, cell, lit) {
   const image = new ImageData(width, height),
@@ -85,7 +85,7 @@ function shade(values, i, x, y, width, height, cell) {
   return Math.max(0.55, Math.min(1.25, 1 + (0.45 * (gx - gy)) / Math.sqrt(gx * gx + gy * gy + 1)));
 }
 
-/** Between which values all but a share of the finite ones lie. */
+/** The quantiles `share` and 1 - `share` of the values that are not NaN; large fields are sampled. */
 export function span(values, share = 0.005) {
   const step = Math.max(1, Math.floor(values.length / 50000)),
     some = [];

@@ -7,14 +7,14 @@ import { fill, h } from "../../base/dom.js";
 import { t } from "../../base/text.js";
 
 /**
- * Outlines that moved more than this between two readings of the robot's pose are drawn broken, px.
+ * Movement of the outlines between two readings of the robot's pose above which they are dashed, px.
  */
 const MOVES = 1.5;
 const COLOUR = "#00e6ff";
 
 /**
- * Shows it in `place` until what is given back is called. `of()` names the job whose part is drawn
- * over it; null: none. `mark(g, width, height)` draws what else lies over it.
+ * Shows the live picture in `place` until the returned function is called. `of()` returns the job
+ * whose part is drawn over it, or null. `mark(g, width, height)` draws further marks over it.
  */
 export function livePicture(place, of = () => null, mark = (_g, _width, _height) => {}) {
   const canvas = h("canvas", {
@@ -56,7 +56,7 @@ export function livePicture(place, of = () => null, mark = (_g, _width, _height)
         )
       : (refused ?? "");
   };
-  /** The part over this picture; none where nobody knows: said why, once. */
+  /** The part's outlines in this picture; null if they are unknown, with the reason in `refused`. */
   const ghost = async (job) => {
     if (!job) return (refused = null);
     try {
@@ -108,8 +108,8 @@ export function livePicture(place, of = () => null, mark = (_g, _width, _height)
 }
 
 /**
- * The part's own corner of the picture; false where the picture shows it large enough, or not at
- * all.
+ * Draws the area around the part, enlarged, into `to`. Returns false if the part is large enough in
+ * the picture, or not in it.
  */
 function enlarged(to, from, part) {
   const span = (k, most) => {
@@ -140,7 +140,7 @@ function enlarged(to, from, part) {
   return true;
 }
 
-/** Pixels' centres are whole numbers in what the server says, half ones on a canvas. */
+/** Draws the outlines. Pixel centres are integers in the server's answer, but at .5 on a canvas. */
 function outlines(g, part, width) {
   g.setLineDash(part.moved_px > MOVES ? [8, 8] : []);
   for (const dark of [true, false]) {

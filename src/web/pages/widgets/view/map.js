@@ -6,12 +6,12 @@ import { fill, h, num } from "../../base/dom.js";
 import { t } from "../../base/text.js";
 import { SCALES, paint } from "./colour.js";
 
-/** Levels of a picture as pixels, in the colours of the scale beside it. */
+/** Grey levels of a picture as RGBA pixels, in the colours of the scale beside the map. */
 const GREYS = Uint32Array.from(
   { length: 256 },
   (_, v) => 0xff000000 | (SCALES.grey[3 * v] * 0x010101),
 );
-/** A drag shorter than this is a click, px. */
+/** A drag that is at most this long is a click, CSS px. */
 const CLICK = 5;
 
 export function map(place, label) {
@@ -160,7 +160,7 @@ export function map(place, label) {
     read.textContent = (m.tool?.says ? `${m.tool.says}\n` : "") + m.reads(m.cross);
   }
 
-  /** The cell that holds a place; -1 outside. */
+  /** Index of the cell that contains a point, mm; -1 outside the grid. */
   function index([x, y]) {
     if (!m.head) return -1;
     const i = Math.floor(x / m.head.cell_mm),
@@ -180,7 +180,7 @@ export function map(place, label) {
     return [(e.clientX - r.left) * ratio(), (e.clientY - r.top) * ratio()];
   };
 
-  /** A place was chosen: the first or the second of the tool's shape. */
+  /** Handles a chosen point: the first or the second of the tool's shape. */
   function choose(p) {
     if (!m.tool) return;
     if (m.tool.shape === "point") return void m.tool.done(p);
@@ -286,7 +286,8 @@ export function map(place, label) {
 
   return {
     /**
-     * Shows a layer: `head` has width, height and cell_mm; `colours` is ordered, grey or diverging.
+     * Shows a layer of values. `head` has width, height and cell_mm; `colours` is ordered, grey or
+     * diverging.
      */
     show(
       head,
@@ -327,8 +328,8 @@ export function map(place, label) {
       redraw();
     },
     /**
-     * A picture as it comes from a camera, grey levels row by row from the top: no scale, no
-     * shading. `reads` says what a place holds.
+     * Shows a picture of a camera: grey levels row by row from the top, without length scale and
+     * shading. `reads(point)` returns the text for a point.
      */
     picture(width, height, grey, reads) {
       const same = m.head && m.head.width === width && m.head.height === height;
@@ -345,12 +346,18 @@ export function map(place, label) {
       off.getContext("2d", { willReadFrequently: true }).putImageData(m.pixels, 0, 0);
       redraw();
     },
-    /** What lies over the map: { kind: line | box | circle | point, points, colour, label }. */
+    /**
+     * Sets the marks over the map: { kind, points, colour, label, wide }; `kind` is line, box,
+     * circle, point or dots.
+     */
     marks(list) {
       m.marks = list;
       redraw();
     },
-    /** What dragging or clicking draws: { shape, says, done(a, b) }; null: the map moves. */
+    /**
+     * Sets what dragging or clicking draws: { shape, says, done(a, b) }. Null: dragging moves the
+     * map.
+     */
     tool(tool) {
       m.tool = tool;
       m.from = m.to = null;
@@ -366,8 +373,8 @@ export function map(place, label) {
       if (m.view) zoom(by, canvas.width / 2, canvas.height / 2);
     },
     /**
-     * Called when the map has been drawn: what lies over it in elements of its own is put into
-     * place.
+     * Sets a function that is called each time the map has been drawn. It positions the HTML
+     * elements that lie over the map.
      */
     after(put) {
       m.after = put;
@@ -408,7 +415,7 @@ function legend(place, [low, high], unit, digits, colours) {
   );
 }
 
-/** The largest of 1, 2, 5 times a power of ten that is no longer. */
+/** The largest number 1, 2 or 5 times a power of ten that is at most `mm`. */
 export function nice(mm) {
   const p = 10 ** Math.floor(Math.log10(mm));
   return [5, 2, 1].map((k) => k * p).find((v) => v <= mm) ?? p;

@@ -13,8 +13,8 @@ const W = 900,
   BOTTOM = 26;
 
 /**
- * A section: `points` of { s, z, sigma }; `chosen(pieces)` hears the pieces that lines are to be
- * fitted to.
+ * A plot of a section; `show` takes `points` of { s, z, sigma }, mm. `chosen(pieces)` receives the
+ * selected pieces, to which lines are then fitted.
  */
 export function section(place, chosen) {
   const plot = svg("svg", {
@@ -171,7 +171,7 @@ function ticks(low, high, most) {
   return out;
 }
 
-/** Bars beside each other: [name, value] each. */
+/** A chart of horizontal bars; `list` holds pairs [name, value]. */
 export function bars(list, unit, digits = 2) {
   const most = Math.max(...list.map(([, v]) => v), 1e-9);
   return h(

@@ -11,10 +11,10 @@ const LAYERS = {
   sigma: ["σ", "mm", 4],
   both: ["Both", "mm", 2],
 };
-/** Where no light came back a height is still to be told from none. */
+/** Least brightness of a cell, so that a dark height still differs from a missing one. */
 const DARKEST = 0.25;
 
-/** Shows a scan's map in `place`; `extra` are further tools beside the layers. */
+/** Shows a scan's map in `place`; `label` names it for assistive technology. */
 export async function scanMap(place, id, label = t("Height map")) {
   let head = await get(`/scans/${id}/map`),
     layers = {};
@@ -79,7 +79,7 @@ export async function scanMap(place, id, label = t("Height map")) {
   read("sigma")
     .then(() => read("intensity"))
     .catch(() => {});
-  /** Reads the scan again: it is looked at otherwise. */
+  /** Loads the scan again, because its filters have changed. */
   const again = async () => {
     head = await get(`/scans/${id}/map`);
     layers = {};
