@@ -246,7 +246,7 @@ fn a_print_is_not_told_to_be_millimetres_off_by_pictures_from_one_direction() {
 }
 
 /// Of the same photographs the prism's terms and a tilted sensor explain 0.02 px, and each would put the principal
-/// point a hundred pixels elsewhere. Neither is believed, the sigmas say so, and the camera is good enough for its work.
+/// point a hundred pixels elsewhere. Neither is adopted, the sigmas contain it, and the camera suffices for its work.
 #[test]
 fn terms_that_explain_less_than_print_can_do_are_not_believed() {
     let Some(reference) = reference() else { return };
