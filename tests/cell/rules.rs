@@ -329,8 +329,11 @@ fn a_right_motion_at_the_slowest_speed_is_not_halted() {
         let served = cell(7, 1.0);
         served.controller.as_real();
         let mut guard = guard(&served, |l| l.max_still_ms = 300.0);
-        // The link sends 0.1 % at least, 1 mm/s.
-        let slow = leg(&mut guard, [0.0, 0.0, -1.5], 0.1);
+        // The link sends 0.1 % at least, 1 mm/s: what is slower would be made faster than it was confirmed.
+        let slower = leg(&mut guard, [0.0, 0.0, -1.5], 0.1);
+        let said = made(&mut guard, plan(vec![slower])).unwrap_err();
+        assert!(said.contains("0.10 mm/s is 0.010 %"), "{said}");
+        let slow = leg(&mut guard, [0.0, 0.0, -1.5], 1.0);
         let said = made(&mut guard, plan(vec![slow]));
         judged((), said.is_ok(), format!("{said:?}"))
     });

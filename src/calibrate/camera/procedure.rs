@@ -420,7 +420,7 @@ fn doubted(doubt: &Doubt) -> String {
     let name: &str = doubt.lens.into();
     format!(
         "the {name} terms are not estimated: they explain {:.3} px of the features' errors, no more than print, blur \
-         and light do, and they would move the viewing rays by {:.2} px; half of that is in the stated uncertainty",
+         and light do. They would move the viewing rays by {:.2} px; half of that is in the stated uncertainty",
         doubt.explained_px, doubt.rays_px
     )
 }

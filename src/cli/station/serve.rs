@@ -77,7 +77,7 @@ pub struct Serve {
     #[arg(long, requires_all = ["password_file", "tls_cert"])]
     tls_key: Option<PathBuf>,
     /// File with a token of 20 characters or more that reads /api/v1/metrics, and nothing else
-    #[arg(long)]
+    #[arg(long, value_name = "FILE")]
     metrics_token_file: Option<PathBuf>,
     /// Name by which browsers call this machine; may be repeated
     #[arg(long = "name", requires = "password_file")]
