@@ -121,6 +121,7 @@ const HOMES: &[(&str, &str)] = &[
     ("mimalloc", "main"),
     ("multiversion", "stages"),
     ("notify", "capture"),
+    ("parquet", "station"),
     ("png", "raster"),
     ("pollster", "gpu"),
     ("rpassword", "cli"),

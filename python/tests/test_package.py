@@ -55,8 +55,8 @@ def test_optional_packages_are_extras_and_load_late():
     extras = set(re.findall(r"^(\w+) = \[", text.partition("\n[")[0], re.M))
     sources = [file.read_text() for file in (ROOT / "python/sheetlight").rglob("*.py")]
     named = {extra for source in sources for extra in re.findall(r'needed\([^()]*"(\w+)"\)', source)}
-    assert named == extras == {"files", "convert", "open3d", "rerun"}
-    heavy = ["laspy", "matplotlib", "open3d", "pyarrow", "pye57", "rerun", "tifffile", "trimesh", "xarray"]
+    assert named == extras == {"files", "convert", "open3d", "ray", "rerun"}
+    heavy = ["laspy", "matplotlib", "open3d", "pyarrow", "pye57", "ray", "rerun", "tifffile", "trimesh", "xarray"]
     code = f"import sys, sheetlight; print([p for p in {heavy} if p in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 

@@ -16,6 +16,7 @@ mod read;
 mod slip;
 mod table;
 mod together;
+mod workplace;
 
 pub use append::Append;
 pub use atomic::{Aside, keep_all, write, write_aside, write_beside, write_unsynced};
@@ -30,3 +31,4 @@ pub use read::{length, read, read_text, read_text_if_there};
 pub use slip::{named, slip_at, slip_in};
 pub use table::{TableRow, table};
 pub use together::Together;
+pub use workplace::Workplace;

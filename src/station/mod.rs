@@ -24,7 +24,12 @@ mod verify;
 pub mod volume;
 
 pub use backup::{Backup, back_up_here, backups, settle_restore};
-pub use batch::{Batch, BatchOptions, BatchRow, FoundAt, Placed, Repeats, Spread, batch, repeats};
+pub use batch::{
+    BatchLine, BatchOptions, BatchRow, Entry, FoundAt, Manifest, Placed, Planned, Problem, Repeats, Shard, ShotRow,
+    Spread, State, Tally, batch, manifest_of, plan, repeats,
+};
+#[cfg(feature = "tables")]
+pub use batch::{Merged, merge};
 pub use calibrate::auto::arm::ArmCell;
 pub use calibrate::auto::cell::{Cell, Light, Went};
 pub use calibrate::auto::check::SelfCheck;

@@ -7,6 +7,7 @@ import csv
 import json
 import math
 import os
+import shutil
 import subprocess
 
 from shots import quiet
@@ -82,6 +83,13 @@ def drawn(s, b, recipe):
     return plan
 
 
+def batched(program, *words, code=0):
+    """The lines that a batch prints, one a recording."""
+    done = subprocess.run([program, "batch", *words], capture_output=True, text=True)
+    assert done.returncode == code, done.stderr
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
 def batch(program, s, folder):
     """One command scans several recordings. Its scans are equal to those of the page, its table has every row, and its
     repeatability is that of the server."""
@@ -92,25 +100,32 @@ def batch(program, s, folder):
     assert all(j["state"] == "done" for j in jobs), jobs
     finds = [s.job({"procedure": "find", "scans": [j["id"]], "recipe": "led"}) for j in jobs]
     recipe = os.path.join(s.station, "jobs", finds[0]["id"], "recipe.toml")
-    made = command(program, "batch", scan, scan, "--station", s.station, "--recipe", recipe, "--out", out)
-    assert [r["scan"] for r in made["rows"]] == ["scan", "scan-2"] and made["repeats"]["places"] == 2, made
+    # The same pictures under another hash.
+    twin = os.path.join(folder, "batch-inputs", "twin")
+    shutil.copytree(scan, twin)
+    with open(os.path.join(twin, "note.txt"), "w") as f:
+        f.write("the part stood still")
+    rows = batched(program, scan, twin, "--station", s.station, "--recipe", recipe, "--out", out)
+    with open(os.path.join(out, "repeats.json")) as f:
+        repeats = json.load(f)
+    assert [r["recording"] for r in rows] == [scan, twin] and repeats["places"] == 2, (rows, repeats)
     first = finds[0]["outcome"]
-    assert all(r["points"] == jobs[0]["outcome"]["points"] and math.dist(r["found"]["part"], first["part"]) < 1e-9 for r in made["rows"]), made["rows"]
-    assert all(a["scatter"] < 1e-12 and a["stated"] > 0 for a in made["repeats"]["along"]), made["repeats"]
-    # Another setting gives another pose, and server and command line agree on it.
-    other = command(program, "batch", scan, "--station", s.station, "--recipe", recipe, "--set", "threshold.minimum=20", "--out", out + "2")
-    assert math.dist(other["rows"][0]["found"]["part"], finds[1]["outcome"]["part"]) < 1e-9 and other["repeats"] is None
+    assert all(r["points"] == jobs[0]["outcome"]["points"] and math.dist(r["found"]["part"], first["part"]) < 1e-9 for r in rows), rows
+    assert all(a["scatter"] < 1e-12 and a["stated"] > 0 for a in repeats["along"]), repeats
+    # With another setting the place is another one, and both tell the same of the two.
+    other = batched(program, scan, "--station", s.station, "--recipe", recipe, "--set", "threshold.minimum=20", "--out", out + "2")
+    assert math.dist(other[0]["found"]["part"], finds[1]["outcome"]["part"]) < 1e-9
     told = s.json("POST", "/repeats", {"jobs": [j["id"] for j in finds]})
     x = [j["outcome"]["part"][3] for j in finds]
     along = told["along"][0]
     assert told["places"] == 2 and abs(along["apart"] - abs(x[0] - x[1])) < 1e-12 and abs(along["scatter"] - abs(x[0] - x[1]) / 2 ** 0.5) < 1e-9, told
-    with open(os.path.join(out, "batch.csv"), newline="") as f:
-        rows = list(csv.DictReader(f))
-    assert [float(r["x_mm"]) for r in rows] == [r["found"]["part"][3] for r in made["rows"]] and rows[0]["passed"] == "true", rows
-    # A folder that is no recording is reported, and the others are processed.
-    worse = command(program, "batch", os.path.join(folder, "none"), scan, "--station", s.station, "--recipe", recipe, "--out", out + "3", code=1)
-    assert worse["rows"][0]["problem"] and not worse["rows"][1]["problem"], worse["rows"]
-    done = subprocess.run([program, "batch", scan, "--station", s.station, "--out", folder], capture_output=True, text=True)
+    with open(os.path.join(out, "recordings.csv"), newline="") as f:
+        table = list(csv.DictReader(f))
+    assert [float(r["x_mm"]) for r in table] == [r["found"]["part"][3] for r in rows] and table[0]["passed"] == "true", table
+    # One that is none is named, and the others go on.
+    worse = batched(program, os.path.join(folder, "none"), scan, "--station", s.station, "--recipe", recipe, "--out", out + "3", code=1)
+    assert worse[0]["problem"] and not worse[1]["problem"], worse
+    done = subprocess.run([program, "batch", twin, "--station", s.station, "--out", scan], capture_output=True, text=True)
     assert done.returncode == 2 and "is a recording" in done.stderr, done.stderr
     s.json("POST", "/lease/release")
 

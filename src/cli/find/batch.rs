@@ -1,5 +1,5 @@
-//! In: recordings, a station, a recipe. Out: a scan of each and the part found in it, one after the other; a table,
-//! and the repeatability of the poses.
+//! In: a manifest or recordings, a station, a recipe. Out: results of each recording, a line of JSON each on standard
+//! output; tables, and how the poses repeat.
 //! Frame and unit: the scans' frame; mm, degrees.
 
 use crate::cli::terminal::arguments::{changes, parse};
@@ -7,38 +7,56 @@ use crate::cli::terminal::console::Console;
 use crate::cli::terminal::interrupt;
 use crate::cli::terminal::outputs::{self, Inputs};
 use crate::fault::{Fault, Result};
-use crate::find::{Accelerator, LocateOptions, Recipe};
+use crate::find::{Accelerator, LocateOptions};
 use crate::robot::Convention;
 use crate::scan::Where;
-use crate::station::{Batch, BatchOptions, BatchRow, Settings, Spread, batch};
-use std::path::PathBuf;
+use crate::station::{
+    BatchLine, BatchOptions, Manifest, Merged, Repeats, Settings, Shard, Spread, State, batch, manifest_of, merge, plan,
+};
+use std::path::{Path, PathBuf};
 
-/// Scan several recordings, find a part in each, report how the poses repeat
+/// Scan an archive of recordings, find a part in each, write tables of all
 ///
-/// Writes a scan folder for each recording, found.json and found.png beside it, and batch.json and batch.csv for all.
-/// If the part stood still between the recordings, the scatter of its poses stands beside the stated sigmas. A
-/// recording that fails is named with its reason, the others continue, and the exit code is 1.
+/// The results of a recording go into a folder in OUT/results. Its name is a hash of the recording, station, recipe and
+/// settings: a recording with results is not scanned again, and equal inputs give equal bytes. Each recording is a line
+/// of JSON on stdout. Exit code 0: all done; 1: some failed, the others continue; 2: wrong use.
+///
+/// A whole run also writes the tables: recordings, shots, matches and figures (Parquet), recordings.csv, and
+/// repeats.json with the scatter of the poses. Runs with --shard leave that to `sheetlight batch merge OUT`.
 #[derive(clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 #[command(after_help = "Example:
-  sheetlight batch recordings/a recordings/b recordings/c --station cell3 \\
-      --recipe data/recipes/led.toml --set threshold.minimum=14 --out batch1
-Guide: docs/finding-and-inserting.md")]
+  sheetlight batch manifest archive --out archive/manifest.txt
+  sheetlight batch archive/manifest.txt --station cell3 --out batch1 --shard 1/2
+  sheetlight batch archive/manifest.txt --station cell3 --out batch1 --shard 2/2
+  sheetlight batch merge batch1
+  sheetlight batch recordings/a recordings/b --station cell3 --out batch2 \\
+      --recipe data/recipes/led.toml --set threshold.minimum=14
+Guide: docs/archives.md")]
 pub struct Args {
-    /// Recording folders, scanned in this order
-    #[arg(required = true)]
-    recordings: Vec<PathBuf>,
+    #[command(subcommand)]
+    command: Option<Command>,
+    /// A manifest, or the folders of recordings, scanned in this order
+    #[arg(required = true, value_name = "MANIFEST|RECORDING")]
+    inputs: Vec<PathBuf>,
     /// Station folder with the calibration
-    #[arg(long)]
-    station: PathBuf,
+    #[arg(long, required = true)]
+    station: Option<PathBuf>,
     /// Recipe (TOML) of the part; without it the recordings are only scanned
     #[arg(long)]
     recipe: Option<PathBuf>,
     /// Change a setting of [extraction]; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE")]
     settings: Vec<String>,
-    /// Folder for scans and tables
-    #[arg(long)]
-    out: PathBuf,
+    /// Folder for results and tables
+    #[arg(long, required = true)]
+    out: Option<PathBuf>,
+    /// Scan the i-th of n shares of the manifest
+    #[arg(long, value_name = "i/n", value_parser = parse::<Shard>)]
+    shard: Option<Shard>,
+    /// Check manifest, station and OUT, and scan nothing
+    #[arg(long, conflicts_with = "shard")]
+    plan: bool,
     /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
     #[arg(long, default_value = "auto", value_parser = parse::<Where>)]
     on: Where,
@@ -47,53 +65,141 @@ pub struct Args {
     robot: Option<Convention>,
 }
 
+#[derive(clap::Subcommand)]
+enum Command {
+    /// Write the tables of a batch from its results
+    Merge {
+        /// Folder that the batch was written into
+        out: PathBuf,
+    },
+    /// List recordings with their hashes
+    Manifest {
+        /// Recordings, or folders above them
+        #[arg(required = true)]
+        folders: Vec<PathBuf>,
+        /// File for the list; recordings are named from its folder
+        #[arg(long)]
+        out: PathBuf,
+    },
+}
+
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    let files: Vec<_> = args.recipe.iter().map(PathBuf::as_path).collect();
-    outputs::check(&[&args.out], &Inputs { files: &files, station: Some(&args.station), ..Inputs::default() })?;
-    let of_station = Settings::load(&args.station)?.robot;
-    let robot = args.robot.or(of_station).unwrap_or(Convention::Matrix);
+    match (&args.command, &args.station, &args.out) {
+        (Some(Command::Merge { out }), ..) => merged(out, console),
+        (Some(Command::Manifest { folders, out }), ..) => listed(folders, out, console),
+        (None, Some(station), Some(out)) => scanned(args, station, out, console),
+        _ => Err(Fault::usage("a station and a folder for results are needed").next("give --station and --out")),
+    }
+}
+
+fn listed(folders: &[PathBuf], out: &Path, console: &Console) -> Result<()> {
+    let root = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let text = manifest_of(folders, root)?;
+    crate::files::write(out, text.as_bytes())?;
+    console.say(format!("{}: {} recordings", out.display(), text.lines().count()));
+    Ok(())
+}
+
+fn scanned(args: &Args, station: &Path, out: &Path, console: &Console) -> Result<()> {
+    let files: Vec<_> = args.recipe.iter().chain(&args.inputs).map(PathBuf::as_path).collect();
+    outputs::check(&[out], &Inputs { files: &files, station: Some(station), ..Inputs::default() })?;
+    let robot = args.robot.or(Settings::load(station)?.robot).unwrap_or(Convention::Matrix);
     let options = BatchOptions {
-        station: args.station.clone(),
-        recordings: args.recordings.clone(),
-        recipe: args.recipe.as_deref().map(Recipe::load).transpose()?,
-        out: args.out.clone(),
+        station: station.to_owned(),
+        recipe: args.recipe.clone(),
+        out: out.to_owned(),
         settings: changes(&args.settings)?,
         place: args.on,
         locate: LocateOptions { robot, accelerator: Accelerator::open(), ..LocateOptions::default() },
         stop: interrupt::asked_for(),
     };
-    let done = batch(&options, |row| console.say(line(row)))?;
-    console.result(&done, &text(&done));
-    console.say(format!("see {}", args.out.join("batch.csv").display()));
-    let failed = done.rows.iter().filter(|r| r.problem.is_some()).count();
-    if failed == 0 {
+    let mut unreadable = 0;
+    let manifest = manifest(&args.inputs, |folder, fault| {
+        unreadable += 1;
+        show(&BatchLine::failed(&folder.to_string_lossy(), &fault), console);
+    })?;
+    if args.plan {
+        console.line(&plan(&manifest, &options)?);
         return Ok(());
     }
-    Err(Fault::refused(format!("{failed} of {} recordings gave no pose", done.rows.len()))
-        .cause("the reason beside each of them")
-        .next("look at the table; their scans are stored"))
+    let tally = batch(&manifest, args.shard.unwrap_or(Shard::WHOLE), &options, |line| show(line, console))?;
+    if args.shard.is_none() {
+        tables(&merge(out)?, out, console);
+    }
+    let bad = tally.refused + tally.failed + unreadable;
+    if bad == 0 {
+        return Ok(());
+    }
+    Err(Fault::refused(format!("{bad} of {} recordings failed: {}", tally.recordings() + unreadable, words(&tally)))
+        .cause("the reason stands beside each of them")
+        .next("look at those lines; recordings without results are scanned by the next run"))
 }
 
-fn line(r: &BatchRow) -> String {
-    let mut s = r.scan.clone();
-    if let Some(n) = r.points {
+fn words(tally: &crate::station::Tally) -> String {
+    format!("{} gave no cloud or no pose, {} are missing or changed", tally.refused, tally.failed)
+}
+
+fn manifest(inputs: &[PathBuf], failed: impl FnMut(&Path, Fault)) -> Result<Manifest> {
+    match inputs.iter().find(|p| p.is_file()) {
+        None => Manifest::of(inputs, failed),
+        Some(file) if inputs.len() == 1 => Manifest::open(file),
+        Some(file) => Err(Fault::usage(format!("{}: a file among {} inputs", file.display(), inputs.len()))
+            .cause("a manifest stands alone, recordings are folders")
+            .next("give one manifest, or folders only")),
+    }
+}
+
+fn merged(out: &Path, console: &Console) -> Result<()> {
+    let merged = merge(out)?;
+    console.line(&serde_json::json!({
+        "recordings": merged.recordings, "refused": merged.refused, "missing": merged.missing,
+        "shots": merged.rows[0], "matches": merged.rows[1], "figures": merged.rows[2],
+    }));
+    tables(&merged, out, console);
+    match &merged.first_missing {
+        None => Ok(()),
+        Some(first) => {
+            let (missing, all) = (merged.missing, merged.recordings);
+            Err(Fault::refused(format!("{missing} of {all} recordings have no results; the first is {first}"))
+                .cause("a shard was not run or was stopped, or these recordings are missing or changed")
+                .next("run the shards again, then merge again; the tables have what is there"))
+        }
+    }
+}
+
+fn tables(merged: &Merged, out: &Path, console: &Console) {
+    if let Some(r) = &merged.repeats {
+        console.say(repeated(r));
+    }
+    console.say(format!("see {}", out.join("recordings.csv").display()));
+}
+
+/// The line as data, and as talk. False where nobody reads the data.
+fn show(line: &BatchLine, console: &Console) -> bool {
+    let read = console.line(line);
+    console.say(talk(line));
+    read
+}
+
+fn talk(line: &BatchLine) -> String {
+    let mut s = line.recording.clone();
+    if let Some(n) = line.points {
         s += &format!(": {n} points");
     }
-    s += &r.median_sigma_mm.map_or(String::new(), |mm| format!(", sigma {mm:.4} mm"));
-    if let Some(f) = &r.found {
+    s += &line.median_sigma_mm.map_or(String::new(), |mm| format!(", sigma {mm:.4} mm"));
+    if let Some(f) = &line.found {
         let [x, y, z] = [3, 7, 11].map(|k| f.part[k]);
         s += &format!("; at {x:.3} {y:.3} {z:.3} mm, score {:.3}", f.score);
     }
-    s + &r.problem.as_ref().map_or(String::new(), |why| format!("; {why}"))
+    if line.state != State::Failed && !line.made {
+        s += "; it was there";
+    }
+    s + &line.problem.as_ref().map_or(String::new(), |p| format!("; {}", p.what))
 }
 
-fn text(b: &Batch) -> String {
-    let mut lines: Vec<String> = b.rows.iter().map(line).collect();
-    if let Some(r) = &b.repeats {
-        lines.push(format!("{} places; 1 sigma of them, what they state, from the first to the last", r.places));
-        lines.extend(r.along.iter().map(spread));
-    }
-    lines.join("\n")
+fn repeated(r: &Repeats) -> String {
+    let head = format!("{} poses; 1 sigma of them, what they state, from the first to the last", r.places);
+    std::iter::once(head).chain(r.along.iter().map(spread)).collect::<Vec<_>>().join("\n")
 }
 
 /// Figures and a small histogram.

@@ -38,7 +38,7 @@ pub fn save(scan: &Path, judged: Option<&Judged>, found: &[FoundPart]) -> Result
                     (peaks(&report))
                     @if map.is_some() { (companions(scan)?) }
                     (machine(&report))
-                    footer { (report.program) " · " (report.created) }
+                    footer { (report.program) @if timed(&report) { " · " (report.created) } }
                 }
             }
         }
@@ -46,6 +46,11 @@ pub fn save(scan: &Path, judged: Option<&Judged>, found: &[FoundPart]) -> Result
     let path = scan.join("index.html");
     crate::files::write(&path, (page.into_string() + "\n").as_bytes())?;
     Ok(path)
+}
+
+/// Whether it says when and where it was made; those of a batch do not.
+fn timed(r: &ScanReport) -> bool {
+    r.created != ScanReport::NO_TIME
 }
 
 fn head(r: &ScanReport, judged: Option<&Judged>) -> Markup {
@@ -61,7 +66,9 @@ fn head(r: &ScanReport, judged: Option<&Judged>) -> Markup {
     if let Some(h) = &r.height_map {
         cards.push((format!("{:.1} %", 100.0 * h.coverage), "of the height map's cells measured"));
     }
-    cards.push((format!("{:.0} shots/s", r.shots_per_second), &r.ran_on));
+    if timed(r) {
+        cards.push((format!("{:.0} shots/s", r.shots_per_second), &r.ran_on));
+    }
     html! {
         header {
             h1 { (r.recording) }
@@ -241,12 +248,12 @@ fn peaks(r: &ScanReport) -> Markup {
 
 fn machine(r: &ScanReport) -> Markup {
     let print: String = r.rig_fingerprint.chars().take(16).collect();
-    let mut rows = vec![
-        ("ran on", r.ran_on.clone()),
-        ("time", format!("{:.2} s, {:.1} shots/s", r.seconds, r.shots_per_second)),
+    let time = format!("{:.2} s, {:.1} shots/s", r.seconds, r.shots_per_second);
+    let mut rows = if timed(r) { vec![("ran on", r.ran_on.clone()), ("time", time)] } else { Vec::new() };
+    rows.extend([
         ("pictures", format!("{}×{}, {} bits", r.image.width, r.image.height, r.image.bits)),
         ("calibration", format!("rig {print}")),
-    ];
+    ]);
     if let Some(p) = &r.places {
         rows.push(("reported places", p.to_string()));
     }
