@@ -3,7 +3,8 @@
     python examples/archives/drift.py FOLDER [--program sheetlight] [--scans 52]
 
 A part stays where it is. The robot reports places that drift by 0.15 mm over the year, and a summer of 0.1 mm. The
-batch finds the part in every scan; what moves is the station. The pictures are the same on every day. It needs duckdb, matplotlib, and the program.
+batch finds the part in every scan; what moves is the station. The pictures are the same on every day.
+It needs duckdb, matplotlib, and the program.
 """
 
 from __future__ import annotations

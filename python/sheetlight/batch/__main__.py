@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from .._error import SheetlightError
 from .driver import Batch, WrongUse, run
@@ -79,8 +81,16 @@ def _workers(given: argparse.Namespace) -> list[Worker]:
     return list(cluster.actors(given.ray, given.workers))
 
 
-def _print(line: dict[str, Any]) -> None:
-    print(json.dumps(line), flush=True)
+def _lines_alone() -> TextIO:
+    """Standard output for the recordings' lines. Ray talks there too, until its end: that goes to standard error."""
+    sys.stdout.flush()
+    out = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    return out
+
+
+def _printer(out: TextIO) -> Callable[[dict[str, Any]], None]:
+    return lambda line: print(json.dumps(line), file=out, flush=True)
 
 
 def main(words: list[str] | None = None) -> int:
@@ -88,7 +98,8 @@ def main(words: list[str] | None = None) -> int:
     given = _arguments().parse_args(words)
     try:
         _positive(given)
-        ended = run(_batch(given), _workers(given), given.shards, _print)
+        printer = _printer(_lines_alone())
+        ended = run(_batch(given), _workers(given), given.shards, printer)
     except SheetlightError as fault:
         print(f"error: {fault}", file=sys.stderr)
         return 2 if isinstance(fault, WrongUse) else 1

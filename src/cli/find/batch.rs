@@ -110,7 +110,7 @@ fn scanned(args: &Args, station: &Path, out: &Path, console: &Console) -> Result
         out: out.to_owned(),
         settings: changes(&args.settings)?,
         place: args.on,
-        locate: LocateOptions { robot, accelerator: Accelerator::open(), ..LocateOptions::default() },
+        locate: LocateOptions { robot, accelerator: accelerator(args), ..LocateOptions::default() },
         stop: interrupt::asked_for(),
     };
     let mut unreadable = 0;
@@ -133,6 +133,12 @@ fn scanned(args: &Args, station: &Path, out: &Path, console: &Console) -> Result
     Err(Fault::refused(format!("{bad} of {} recordings failed: {}", tally.recordings() + unreadable, words(&tally)))
         .cause("the reason stands beside each of them")
         .next("look at those lines; recordings without results are scanned by the next run"))
+}
+
+/// A GPU where one may be used and something is looked for.
+fn accelerator(args: &Args) -> Option<Accelerator> {
+    let wanted = args.on != Where::Cpu && args.recipe.is_some() && !args.plan;
+    if wanted { Accelerator::open() } else { None }
 }
 
 fn words(tally: &crate::station::Tally) -> String {
