@@ -1,4 +1,4 @@
-//! In: what a calibration says of its camera's errors. Out: a matrix that is known to be a covariance.
+//! In: what a calibration states about its camera's errors. Out: a matrix that is known to be a covariance.
 //! Frame and unit: rows and columns in the order of [`NAMES`], units multiplied.
 
 use super::parameters::{ALWAYS_NAMED, NAMES, PARAMETERS, ParameterMatrix, Parameters};
@@ -7,7 +7,8 @@ use crate::geometry::not_a_covariance;
 use nalgebra::DMatrix;
 
 /// Covariance of a camera's numbers: rows and columns in the order of [`NAMES`] (fx fy cx cy, the lens's terms,
-/// skew), units multiplied. Finite, symmetric, positive semidefinite; a parameter without variance counts as known.
+/// skew), units multiplied. It is finite, symmetric and positive semidefinite. A parameter without variance counts
+/// as exactly known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraCovariance(ParameterMatrix);
 
@@ -25,12 +26,12 @@ impl CameraCovariance {
         }
     }
 
-    /// Of a camera without error.
+    /// The covariance of a camera without error.
     pub fn exact() -> CameraCovariance {
         CameraCovariance(ParameterMatrix::zeros())
     }
 
-    /// Of parameters with these standard deviations that know nothing of each other.
+    /// The covariance of independent parameters with these standard deviations.
     ///
     /// # Errors
     /// A number that is not finite.
@@ -43,7 +44,7 @@ impl CameraCovariance {
         &self.0
     }
 
-    /// Indices of the parameters that a file names: the first nine, and those whose variance is not zero.
+    /// Indices of the parameters that a file names: the first nine, and those with nonzero variance.
     pub fn named(&self) -> Vec<usize> {
         named(&self.0)
     }

@@ -1,12 +1,12 @@
-//! In: a lens's fourteen terms in OpenCV's order. Out: where a ray lands on the sensor, the derivatives, and the way
-//! back (docs/math.md, Camera (5) to (8)).
-//! Frame and unit: normalised image coordinates (x/z, y/z) and what the lens and a tilted sensor make of them; tau in
-//! rad.
+//! In: a lens's fourteen terms in OpenCV's order. Out: where a ray lands on the sensor, the derivatives, and the
+//! inverse mapping (docs/math.md, Camera (5) to (8)).
+//! Frame and unit: ideal normalised image coordinates (x/z, y/z), and those after distortion by the lens and a
+//! tilted sensor; tau in rad.
 
 use crate::geometry::{Mat3, Vec2, Vec3};
 use nalgebra::{Matrix2, SMatrix};
 
-/// How many terms there are.
+/// Number of terms.
 pub const TERMS: usize = 14;
 
 /// k1 k2 p1 p2 k3 (Brown-Conrady), k4 k5 k6 (rational), s1 s2 s3 s4 (thin prism), tau_x tau_y (tilted sensor) in
@@ -15,7 +15,7 @@ pub const TERMS: usize = 14;
 pub struct Distortion(pub [f64; TERMS]);
 
 impl From<[f64; 5]> for Distortion {
-    /// k1 k2 p1 p2 k3.
+    /// From k1 k2 p1 p2 k3; the other terms are zero.
     fn from(brown: [f64; 5]) -> Distortion {
         Distortion(std::array::from_fn(|i| brown.get(i).copied().unwrap_or(0.0)))
     }
@@ -28,7 +28,7 @@ impl std::ops::Index<usize> for Distortion {
     }
 }
 
-/// The radial factor N / D and its derivative by r².
+/// The radial factor N / D and its derivative with respect to r².
 struct Radial {
     factor: f64,
     slope: f64,
@@ -36,20 +36,20 @@ struct Radial {
 }
 
 impl Distortion {
-    /// The lists that OpenCV writes: 4, 5, 8, 12 or 14 terms.
+    /// From a list as OpenCV writes it: 4, 5, 8, 12 or 14 terms.
     pub fn from_opencv(terms: &[f64]) -> Option<Distortion> {
         let known = matches!(terms.len(), 4 | 5 | 8 | 12 | 14);
         known.then(|| Distortion(std::array::from_fn(|i| terms.get(i).copied().unwrap_or(0.0))))
     }
 
-    /// The shortest of the lists that OpenCV reads (5, 8, 12, 14) with all that is not zero.
+    /// The shortest list that OpenCV reads (5, 8, 12, 14) and that contains all nonzero terms.
     pub fn to_opencv(&self) -> &[f64] {
         let used = self.0.iter().rposition(|t| *t != 0.0).map_or(0, |i| i + 1);
         let length = [5, 8, 12, 14].into_iter().find(|n| *n >= used).unwrap_or(TERMS);
         &self.0[..length]
     }
 
-    /// True where nothing beyond k1 k2 p1 p2 k3 bends a ray.
+    /// Whether only k1 k2 p1 p2 k3 distort a ray.
     pub fn is_brown(&self) -> bool {
         self.to_opencv().len() == 5
     }
@@ -57,7 +57,7 @@ impl Distortion {
     fn radial(&self, r2: f64) -> Radial {
         let [k1, k2, _, _, k3, k4, k5, k6, ..] = self.0;
         let denominator = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6));
-        // Beyond a pole there is no picture: a solve that tries such a lens must not take it for one.
+        // Beyond a pole the lens forms no image. NaN keeps a solver that tries such a lens from accepting it.
         let numerator = if denominator > 0.0 { 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)) } else { f64::NAN };
         let factor = numerator / denominator;
         let falls = k4 + r2 * (2.0 * k5 + 3.0 * k6 * r2);
@@ -65,7 +65,7 @@ impl Distortion {
         Radial { factor, slope, denominator }
     }
 
-    /// The lens without the sensor's tilt; not a number beyond a pole of the rational factor.
+    /// The distortion of the lens without the sensor's tilt; NaN beyond a pole of the rational factor.
     fn bent(&self, n: &Vec2) -> Vec2 {
         let [_, _, p1, p2, _, _, _, _, s1, s2, s3, s4, ..] = self.0;
         let (x, y) = (n.x, n.y);
@@ -77,7 +77,7 @@ impl Distortion {
         )
     }
 
-    /// d(bent)/d(ideal); not a number beyond a pole of the rational factor.
+    /// d(bent)/d(ideal); NaN beyond a pole of the rational factor.
     fn bent_jacobian(&self, n: &Vec2) -> Matrix2<f64> {
         let [_, _, p1, p2, _, _, _, _, s1, s2, s3, s4, ..] = self.0;
         let (x, y) = (n.x, n.y);
@@ -93,7 +93,8 @@ impl Distortion {
         )
     }
 
-    /// From the untilted image plane to the tilted sensor, and its derivatives by tau_x and tau_y.
+    /// Mapping from the untilted image plane to the tilted sensor, and its derivatives with respect to tau_x and
+    /// tau_y.
     pub fn tilt(&self) -> Option<[Mat3; 3]> {
         let [.., tau_x, tau_y] = self.0;
         if tau_x == 0.0 && tau_y == 0.0 {
@@ -140,8 +141,8 @@ impl Distortion {
         by
     }
 
-    /// Sensor coordinates to ideal ones, to 1e-12. `None` outside the region round the axis in which the lens is one
-    /// to one.
+    /// Sensor coordinates to ideal ones, to 1e-12. `None` outside the region around the axis in which the mapping is
+    /// one to one.
     pub fn undistort(&self, d: &Vec2) -> Option<Vec2> {
         let flat = match self.tilt() {
             Some([t, ..]) => Some(projected(&t.try_inverse()?, d)).filter(|p| p.x.is_finite() && p.y.is_finite())?,
@@ -150,7 +151,7 @@ impl Distortion {
         self.newton(&flat, flat).filter(|n| self.connected(n)).or_else(|| self.walk(&flat))
     }
 
-    /// True where the map is one to one between the axis and n.
+    /// Whether the mapping is one to one between the axis and n.
     pub fn connected(&self, n: &Vec2) -> bool {
         [0.25, 0.5, 0.75, 1.0].iter().all(|t| upright(&self.bent_jacobian(&(n * *t))))
     }
@@ -170,7 +171,8 @@ impl Distortion {
         ((self.bent(&n) - flat).norm() < 1e-12 && upright(&self.bent_jacobian(&n))).then_some(n)
     }
 
-    /// From the axis outwards in steps: Newton's method from the distorted place jumps over a fold of a strong lens.
+    /// Solves in steps from the axis outwards: Newton's method started at the distorted point jumps over a fold of a
+    /// strong lens.
     fn walk(&self, flat: &Vec2) -> Option<Vec2> {
         let (mut n, mut done, mut step) = (Vec2::zeros(), 0.0, 0.25);
         while done < 1.0 {
@@ -185,15 +187,15 @@ impl Distortion {
     }
 }
 
-/// True where nothing is folded over: beyond two folds the determinant is positive again, the picture turned by half
-/// a turn.
+/// Whether the mapping is not folded. Beyond two folds the determinant is positive again, with the image rotated by
+/// 180 degrees; the trace detects that.
 fn upright(j: &Matrix2<f64>) -> bool {
     j.determinant() > 0.0 && j.trace() > 0.0
 }
 
 fn projected(t: &Mat3, p: &Vec2) -> Vec2 {
     let v = t * Vec3::new(p.x, p.y, 1.0);
-    // Behind a sensor that is tilted into the light there is no picture.
+    // A ray from behind a strongly tilted sensor forms no image.
     if v.z > 0.0 { v.xy() / v.z } else { Vec2::repeat(f64::NAN) }
 }
 
@@ -202,8 +204,8 @@ fn projected_jacobian(t: &Mat3, p: &Vec2) -> Matrix2<f64> {
     (t.fixed_view::<2, 2>(0, 0) - at * t.fixed_view::<1, 2>(2, 0)) / v.z
 }
 
-/// P(R) R with R = R_y(tau_y) R_x(tau_x), P projecting along the axis back on the tilted plane, and the derivatives
-/// by both.
+/// P(R) R with R = R_y(tau_y) R_x(tau_x), where P projects along the axis back onto the tilted plane; and the
+/// derivatives with respect to both angles.
 fn tilt(tau_x: f64, tau_y: f64) -> [Mat3; 3] {
     let ((sx, cx), (sy, cy)) = (tau_x.sin_cos(), tau_y.sin_cos());
     let about_x = Mat3::new(1.0, 0.0, 0.0, 0.0, cx, sx, 0.0, -sx, cx);

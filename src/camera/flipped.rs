@@ -1,28 +1,28 @@
-//! The camera of pictures that were turned or mirrored after they were read from the sensor.
+//! The camera model for pictures that were turned or mirrored after they were read from the sensor.
 
 use super::{Intrinsics, LENS, SKEW};
 
 /// A picture that is turned by 180 degrees or mirrored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flip {
-    /// By 180 degrees.
+    /// Turned by 180 degrees.
     Turned,
-    /// Left is right.
+    /// Left and right are exchanged.
     LeftRight,
-    /// Up is down.
+    /// Top and bottom are exchanged.
     UpDown,
 }
 
 impl Flip {
-    /// All of them.
+    /// All flips.
     pub const ALL: [Flip; 3] = [Flip::Turned, Flip::LeftRight, Flip::UpDown];
 
-    /// Columns reversed, rows reversed.
+    /// Whether the columns and the rows are reversed.
     pub fn reversed(self) -> [bool; 2] {
         [self != Flip::UpDown, self != Flip::LeftRight]
     }
 
-    /// In words: the pictures are ...
+    /// In words; completes "the pictures are ...".
     pub fn words(self) -> &'static str {
         match self {
             Flip::Turned => "turned by 180 degrees",
@@ -33,8 +33,8 @@ impl Flip {
 }
 
 impl Intrinsics {
-    /// The camera that sees in flipped pictures what this one sees. Terms of the lens that push along x change their
-    /// sign with the columns, those along y with the rows; radial ones stay.
+    /// The camera model that sees in flipped pictures what this one sees in unflipped ones. Terms of the lens that
+    /// shift along x change their sign with the columns, those along y with the rows; radial terms stay.
     pub fn flipped(&self, flip: Flip) -> Intrinsics {
         let [columns, rows] = flip.reversed();
         let mut k = self.parameters();

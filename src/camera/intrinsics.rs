@@ -1,5 +1,5 @@
-//! In: a pinhole camera with its lens. Out: pixels of camera-frame points and
-//! viewing rays of pixels (docs/math.md eq. 4 to 8; the paper's eq. 1 with the lens added); how a file holds it.
+//! In: a pinhole camera with its lens. Out: pixels of camera-frame points and viewing rays of pixels (docs/math.md
+//! eq. 4 to 8; the paper's eq. 1 with the lens added); the representation in files.
 //! Frame and unit: camera frame (x right, y down, z forward), mm; an integer pixel is a pixel centre.
 
 use super::distortion::Distortion;
@@ -11,26 +11,26 @@ use nalgebra::Matrix2;
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(try_from = "Written", into = "Written")]
 pub struct Intrinsics {
-    /// Focal lengths, px.
+    /// Focal length along u: px of u per normalised x.
     pub fx: f64,
-    /// px of v per normalised y.
+    /// Focal length along v: px of v per normalised y.
     pub fy: f64,
-    /// Principal point, px.
+    /// Column of the principal point, px; 0 is the middle of the leftmost column.
     pub cx: f64,
     /// Row of the principal point, px; 0 is the middle of the topmost row.
     pub cy: f64,
-    /// px of u per normalised y; 0 for every sensor with square rows.
+    /// px of u per normalised y; 0 for a sensor whose rows and columns are perpendicular.
     pub skew: f64,
     /// The lens: fourteen terms in OpenCV's order.
     pub distortion: Distortion,
-    /// Sensor size, px.
+    /// Columns of the sensor, px.
     pub width: u32,
-    /// Rows, px.
+    /// Rows of the sensor, px.
     pub height: u32,
 }
 
 impl Intrinsics {
-    /// Refuses numbers that no camera has.
+    /// Refuses numbers that no camera can have.
     pub fn check(&self) -> Result<()> {
         let all = [self.fx, self.fy, self.cx, self.cy, self.skew];
         let finite = all.iter().chain(&self.distortion.0).all(|x| x.is_finite());
@@ -53,7 +53,7 @@ impl Intrinsics {
         Ok(())
     }
 
-    /// Longer side of what is seen at a depth, mm; the lens left out.
+    /// Longer side of the field of view at a depth, mm; lens distortion is ignored.
     pub fn view_mm(&self, depth: f64) -> f64 {
         depth.abs() * f64::max(f64::from(self.width) / self.fx, f64::from(self.height) / self.fy)
     }
@@ -102,8 +102,8 @@ impl Intrinsics {
         Ray::new(Vec3::zeros(), Vec3::new(n.x, n.y, 1.0))
     }
 
-    /// The same lens and field of view on a sensor with `width` pixels across; for sensors that
-    /// bin or for a calibration taken at another resolution. The lens's terms, tilt included, belong to rays and stay.
+    /// The same lens and field of view on a sensor of `width` by `height` pixels; for sensors that bin, or for a
+    /// calibration taken at another resolution. The lens's terms, including tilt, act on rays and stay.
     pub fn scaled_to(&self, width: u32, height: u32) -> Intrinsics {
         let (sx, sy) = (f64::from(width) / f64::from(self.width), f64::from(height) / f64::from(self.height));
         Intrinsics {
@@ -118,7 +118,7 @@ impl Intrinsics {
         }
     }
 
-    /// The same camera with only a part of its sensor read out, from pixel (left, top) on.
+    /// The same camera with only a part of its sensor read out, starting at pixel (left, top).
     pub fn region(&self, left: f64, top: f64, width: u32, height: u32) -> Intrinsics {
         Intrinsics { cx: self.cx - left, cy: self.cy - top, width, height, ..*self }
     }

@@ -1,4 +1,4 @@
-//! In: a pinhole camera with its lens. Out: pixels of points, rays of pixels, the parameters by name.
+//! In: a pinhole camera with its lens. Out: pixels of points, rays of pixels, named parameters.
 //! Frame and unit: camera frame (x right, y down, z forward), mm; an integer pixel is a pixel centre.
 
 mod covariance;

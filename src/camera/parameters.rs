@@ -1,15 +1,15 @@
-//! In: a camera. Out: its parameters as one vector under names, which calibration files, covariances and derivatives
-//! share.
-//! Frame and unit: px and the lens's own; each name ends with its unit.
+//! In: a camera. Out: its parameters as one vector with names; calibration files, covariances and derivatives use
+//! the same order.
+//! Frame and unit: px, and the units of the lens's terms; each name ends with its unit.
 
 use super::distortion::{Distortion, TERMS};
 use super::intrinsics::Intrinsics;
 use nalgebra::{SMatrix, SVector};
 
-/// How many parameters a camera has: fx fy cx cy, the lens's terms, skew.
+/// Number of parameters of a camera: fx fy cx cy, the lens's terms, skew.
 pub const PARAMETERS: usize = 5 + TERMS;
 
-/// Their names, in order.
+/// Names of the parameters, in order.
 pub const NAMES: [&str; PARAMETERS] = [
     "fx_px",
     "fy_px",
@@ -32,21 +32,21 @@ pub const NAMES: [&str; PARAMETERS] = [
     "skew_px",
 ];
 
-/// Of the first term of the lens, and of the skew.
+/// Index of the lens's first term.
 pub const LENS: usize = 4;
-/// Of the skew, the last one.
+/// Index of the skew, the last parameter.
 pub const SKEW: usize = PARAMETERS - 1;
-/// Files name these always, the others where they are free.
+/// Number of parameters that files always name; the others are named if they were free.
 pub const ALWAYS_NAMED: usize = 9;
 
 /// A camera's numbers in the order of [`NAMES`], each in the unit that its name ends with.
 pub type Parameters = SVector<f64, PARAMETERS>;
-/// A square of them: rows and columns in the order of [`NAMES`]. What is known to be a covariance is a
+/// A square matrix with rows and columns in the order of [`NAMES`]. A matrix that is known to be a covariance is a
 /// [`super::CameraCovariance`].
 pub type ParameterMatrix = SMatrix<f64, PARAMETERS, PARAMETERS>;
 
 impl Intrinsics {
-    /// Its numbers in the order of [`NAMES`].
+    /// The camera's numbers in the order of [`NAMES`].
     pub fn parameters(&self) -> Parameters {
         let mut v = Parameters::zeros();
         (v[0], v[1], v[2], v[3], v[SKEW]) = (self.fx, self.fy, self.cx, self.cy, self.skew);
@@ -54,7 +54,7 @@ impl Intrinsics {
         v
     }
 
-    /// The same sensor with these parameters.
+    /// A camera with the same sensor and these parameters.
     pub fn with_parameters(&self, v: &Parameters) -> Intrinsics {
         Intrinsics {
             fx: v[0],
@@ -73,7 +73,7 @@ impl Intrinsics {
     }
 }
 
-/// Step for derivatives by differences: a thousandth of what matters.
+/// Step for derivatives by differences: 0.05 px, and 1e-4 for the lens's terms.
 pub fn difference_step(parameter: usize) -> f64 {
     if (LENS..SKEW).contains(&parameter) { 1e-4 } else { 0.05 }
 }

@@ -1,36 +1,36 @@
-//! Which part of its sensor a camera sends, and at which resolution; the camera model that belongs to it.
+//! The part of its sensor that a camera sends, its resolution, and the camera model for it.
 
 use super::Intrinsics;
 
-/// How a camera reads its sensor: it adds pixels together (binning), passes pixels over (decimation), and cuts a region
-/// out of what is left. Columns come before rows.
+/// How a camera reads its sensor: it combines pixels (binning), skips pixels (decimation), and cuts a region out of
+/// the result. Columns come before rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Readout {
-    /// Left and top of the region, px of the pictures: counted after binning and decimation, as GenICam's OffsetX and
-    /// OffsetY are.
+    /// Left and top of the region, px of the pictures: counted after binning and decimation, like GenICam's OffsetX
+    /// and OffsetY.
     #[serde(default)]
     pub offset_px: [u32; 2],
-    /// Pixels of the sensor that are one of the picture: it lies in their middle.
+    /// Number of sensor pixels combined into one pixel of the picture, which lies at their middle.
     #[serde(default = "each")]
     pub binning: [u32; 2],
-    /// One pixel in so many is read: the picture's lies where that one does.
+    /// One pixel in this many is read; the picture's pixel lies where that one does.
     #[serde(default = "each")]
     pub decimation: [u32; 2],
-    /// The picture is mirrored.
+    /// Whether the picture is mirrored.
     #[serde(default)]
     pub reversed: [bool; 2],
-    /// Size of the whole sensor, px; none where the camera does not say.
+    /// Size of the whole sensor, px; none if the camera does not state it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor_px: Option<[u32; 2]>,
-    /// The picture shows what the calibration's pictures show, at another resolution: of a camera that scales its
-    /// pictures, or of two modes of one sensor. It stands alone: a region or binning says another thing.
+    /// The picture shows the view of the calibration's pictures at another resolution: a camera that scales its
+    /// pictures, or two modes of one sensor. It excludes the other keys: a region or binning would change the view.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub same_view: bool,
 }
 
 impl Intrinsics {
-    /// The readout of pictures that show all of this camera's sensor.
+    /// The readout of pictures that show this camera's entire sensor.
     pub fn whole_sensor(&self) -> Readout {
         Readout { sensor_px: Some([self.width, self.height]), ..Readout::default() }
     }
@@ -41,7 +41,7 @@ fn each() -> [u32; 2] {
 }
 
 impl Default for Readout {
-    /// All of the sensor, every pixel.
+    /// The whole sensor, every pixel.
     fn default() -> Readout {
         Readout {
             offset_px: [0; 2],
@@ -69,18 +69,18 @@ impl std::fmt::Display for Readout {
 }
 
 impl Readout {
-    /// Pixels of the sensor from one of the picture to the next.
+    /// Distance on the sensor from one pixel of the picture to the next, sensor px.
     pub fn step(&self) -> [u32; 2] {
         [0, 1].map(|i| self.binning[i].saturating_mul(self.decimation[i]))
     }
 
-    /// The size of the sensor that pictures of this size reach to, px.
+    /// Extent of the sensor that pictures of this size cover, counted from its first pixel, px.
     pub fn reach(&self, size: [u32; 2]) -> [u64; 2] {
         let step = self.step();
         [0, 1].map(|i| (u64::from(self.offset_px[i]) + u64::from(size[i])) * u64::from(step[i]))
     }
 
-    /// The camera of pictures of this size, of a camera whose every pixel is read.
+    /// Converts the camera model of the fully read sensor into that of pictures of this size.
     pub fn of_whole(&self, whole: &Intrinsics, [width, height]: [u32; 2]) -> Intrinsics {
         let [x, y] = self.axes();
         Intrinsics {
@@ -95,8 +95,8 @@ impl Readout {
         }
     }
 
-    /// The camera whose every pixel is read, of one whose pictures are read out like this. Its size is the sensor's, or
-    /// what is known of that.
+    /// Converts the camera model of pictures with this readout into that of the fully read sensor. Its size is the
+    /// sensor's, or if that is unknown the part that the pictures reach.
     pub fn to_whole(&self, camera: &Intrinsics) -> Intrinsics {
         let [x, y] = self.axes();
         let reach = self.reach([camera.width, camera.height]).map(|n| u32::try_from(n).unwrap_or(u32::MAX));
@@ -116,7 +116,7 @@ impl Readout {
     fn axes(&self) -> [Axis; 2] {
         [0, 1].map(|i| {
             let [binning, decimation] = [self.binning[i], self.decimation[i]].map(f64::from);
-            // A binned pixel's centre is the middle of its pixels, with centres at whole numbers.
+            // A binned pixel's centre is the middle of its sensor pixels, whose centres are at integers.
             Axis { step: binning * decimation, first: 0.5 * (binning - 1.0), offset: f64::from(self.offset_px[i]) }
         })
     }
@@ -154,16 +154,16 @@ mod tests {
         let whole = camera();
         let points = [Vec3::new(12.0, -30.0, 300.0), Vec3::new(-60.0, 41.0, 420.0)];
         for (readout, size, place) in [
-            // Two columns are one, and three rows; then a region.
+            // Two columns are combined, and three rows; then a region is cut out.
             (
                 Readout { binning: [2, 3], offset_px: [10, 7], ..Readout::default() },
                 [200, 100],
                 (|u, v| ((u - 0.5) / 2.0 - 10.0, (v - 1.0) / 3.0 - 7.0)) as fn(f64, f64) -> (f64, f64),
             ),
-            // Every second column is read, the first one too.
+            // Every second column is read, starting with the first.
             (Readout { decimation: [2, 1], ..Readout::default() }, [320, 480], |u, v| (u / 2.0, v)),
             (Readout { offset_px: [160, 120], ..Readout::default() }, [320, 240], |u, v| (u - 160.0, v - 120.0)),
-            // Binned by 2, then every third of those.
+            // Binned by 2, then every third column of the result.
             (Readout { binning: [2, 2], decimation: [3, 1], ..Readout::default() }, [106, 240], |u, v| {
                 ((u - 0.5) / 6.0, (v - 0.5) / 2.0)
             }),
@@ -178,7 +178,7 @@ mod tests {
                 assert!((back - full).norm() < 1e-9, "{readout}: {back:?} {full:?}");
             }
         }
-        // What scales a picture as a whole bins it.
+        // Scaling a picture as a whole is the same as binning it.
         let binned = Readout { binning: [2, 2], ..Readout::default() }.of_whole(&whole, [320, 240]);
         let scaled = whole.scaled_to(320, 240);
         assert!((binned.cx - scaled.cx).abs() < 1e-12 && (binned.fy - scaled.fy).abs() < 1e-12);

@@ -1,11 +1,11 @@
-//! In: cameras with every kind of lens. Out: whether pixels, rays, derivatives and files agree with each other and with
-//! OpenCV's numbers. Frame and unit: camera frame, mm; px.
+//! In: cameras with every kind of lens. Out: whether pixels, rays, derivatives and files agree with each other and
+//! with OpenCV's numbers. Frame and unit: camera frame, mm; px.
 
 use super::*;
 use crate::geometry::{Vec2, Vec3};
 use proptest::prelude::*;
 
-/// The paper's camera with a lens like the ones of the reference rigs.
+/// The paper's camera with a lens similar to those of the reference rigs.
 fn paper() -> Intrinsics {
     Intrinsics {
         fx: 611.6,
@@ -101,8 +101,8 @@ fn every_lens_projects_as_opencv_does() {
     }
 }
 
-/// Terms of a lens that somebody could own, drawn from the whole space: barrel to 15 % and more, pincushion, rational,
-/// prism, tilted.
+/// Terms of a realistic lens, drawn from the whole range: barrel to 15 % and more, pincushion, rational, prism,
+/// tilted.
 fn any_lens() -> impl Strategy<Value = Distortion> {
     let brown = (-0.35f64..0.25, -0.1f64..0.15, -0.003f64..0.003, -0.003f64..0.003, -0.05f64..0.05);
     let rational =
@@ -110,13 +110,13 @@ fn any_lens() -> impl Strategy<Value = Distortion> {
     let prism = prop_oneof![Just([0.0; 4]), [-0.005f64..0.005, -0.005..0.005, -0.005..0.005, -0.005..0.005]];
     let tilt = prop_oneof![Just([0.0; 2]), [-0.35f64..0.35, -0.35..0.35]];
     (brown, rational, prism, tilt).prop_map(|((k1, k2, p1, p2, k3), [k4, k5, k6], [s1, s2, s3, s4], [x, y])| {
-        // A rational factor is a quotient: k1 beside k4 is what bends.
+        // A rational factor is a quotient: the difference of k1 and k4 causes the distortion.
         Distortion([k1 + k4, k2 + k5, p1, p2, k3 + k6, k4, k5, k6, s1, s2, s3, s4, x, y])
     })
 }
 
-/// Newton's method jumps over both folds of this lens, radial and tangential, to where its determinant is positive
-/// again.
+/// Newton's method jumps over both folds of this lens, radial and tangential, to a point where its determinant is
+/// positive again.
 #[test]
 fn what_is_turned_by_half_a_turn_beyond_two_folds_is_no_ray() {
     let lens = Distortion::from([0.2452318549799642, 0.11399441860892635, 0.0, 0.0, -0.03042951380470863]);
@@ -126,8 +126,8 @@ fn what_is_turned_by_half_a_turn_beyond_two_folds_is_no_ray() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
-    /// Inside the region round the axis where the lens is one to one, to its very edge, there and back is the same
-    /// ray; and what is answered at all is a ray of that region.
+    /// Inside the region around the axis where the lens is one to one, up to its edge, distorting and undistorting
+    /// returns the same ray. Every returned ray lies in that region.
     #[test]
     fn lenses_are_inverted_where_they_are_one_to_one(lens in any_lens(), x in -1.1f64..1.1, y in -1.1f64..1.1) {
         let n = Vec2::new(x, y);
@@ -168,7 +168,7 @@ proptest! {
         let back = cam.pixel_from_point(&(ray.direction * z)).unwrap();
         prop_assert!((back - Vec2::new(u, v)).norm() < 1e-9);
     }
-    /// Binned and cut-out pictures see the same rays, whatever the lens.
+    /// Binned and cropped pictures have the same rays, whatever the lens.
     #[test]
     fn scaling_and_cutting_keep_the_rays(lens in any_lens(), u in 60.0f64..580.0, v in 60.0f64..420.0,
         left in 0u32..64, top in 0u32..64) {

@@ -1,49 +1,49 @@
-//! In: the numbers of pictures as they come, incomplete ones, outages. Out: an account in which every picture that
-//! the camera sent stands under its own name.
+//! In: the numbers of pictures as they arrive, incomplete ones, outages. Out: an account that assigns every picture
+//! that the camera sent to one class.
 //! Frame and unit: pictures.
 
 use super::clock::now_ns;
 use super::metrics::Metrics;
 
-/// What became of every picture that the camera says it sent.
+/// What became of every picture that the camera reports to have sent.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Account {
-    /// What the camera says it sent, or took: by its own counter, or by its numbers. With what an outage is reckoned
-    /// to have cost.
+    /// Pictures that the camera reports to have sent or taken, by its own counter or by its numbers. The estimated
+    /// losses of outages are included.
     pub sent: u64,
-    /// Came whole and in order.
+    /// Arrived complete and in order.
     pub complete: u64,
-    /// Came in part: packets were lost and did not come again. No picture.
+    /// Arrived in part: packets were lost and not received again. Such a picture is not used.
     pub incomplete: u64,
-    /// Never came: the camera, the cable or the network lost them.
+    /// Never arrived: lost by the camera, the cable or the network.
     pub missed: u64,
-    /// Came whole after a later one: order is kept, they are left out.
+    /// Arrived complete after a later one; excluded to keep the order.
     pub late: u64,
-    /// Packets that were asked for again and came; no pictures.
+    /// Packets that were requested again and arrived; not a number of pictures.
     pub resent: u64,
-    /// Complete, and the memory for waiting pictures was full.
+    /// Complete, but the memory for waiting pictures was full.
     pub dropped_queue: u64,
-    /// Complete, and the disk was full or too slow.
+    /// Complete, but the disk was full or too slow.
     pub dropped_disk: u64,
-    /// Complete, and passed over for a newer one or because processing was too slow.
+    /// Complete, but skipped for a newer one, or because processing was too slow.
     pub dropped_processing: u64,
-    /// Complete, and nobody knows where what moves stood: left out and listed.
+    /// Complete, but the position of what moves is unknown; excluded and listed.
     pub unpaired: u64,
-    /// Complete, and handed on: recorded, scanned or shown.
+    /// Complete and delivered: recorded, scanned or shown.
     pub used: u64,
-    /// How often the camera was gone and came back.
+    /// Number of times that the camera was lost and came back.
     pub outages: u64,
 }
 
 impl Account {
-    /// Pictures of which nobody says what became of them: 0, or the program is wrong.
+    /// Pictures that no class explains: anything but 0 is an error of the program.
     pub fn unexplained(&self) -> i64 {
         let [sent, arrived] = [self.sent, self.complete + self.incomplete + self.missed + self.late].map(|n| n as i64);
         let after = self.dropped_queue + self.dropped_disk + self.dropped_processing + self.unpaired + self.used;
         (sent - arrived).abs() + (self.complete as i64 - after as i64).abs()
     }
 
-    /// All pictures that were dropped after they had come.
+    /// All pictures that were dropped after they had arrived.
     pub fn dropped(&self) -> u64 {
         self.dropped_queue + self.dropped_disk + self.dropped_processing
     }
@@ -66,7 +66,7 @@ impl Account {
         ]
     }
 
-    /// As Prometheus reads it.
+    /// The account in Prometheus' text format.
     pub fn prometheus(&self, camera: &str) -> String {
         let mut metrics = Metrics::default();
         self.count(camera, &mut metrics);
@@ -83,7 +83,7 @@ impl Account {
 }
 
 impl std::fmt::Display for Account {
-    /// What is not 0, in one line.
+    /// All numbers that are not 0, in one line.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let rows = self.rows();
         let shown = rows.iter().filter(|(name, n)| *n > 0 || matches!(*name, "sent" | "used"));
@@ -100,30 +100,30 @@ pub struct Ledger {
     expected: Option<u64>,
     /// Accounted for since the camera was opened.
     since_open: u64,
-    /// Host time of the last picture, and the usual time between two by their numbers, ns.
+    /// Host time of the last picture, ns, and the usual time between two consecutive numbers, ns.
     last_ns: Option<u64>,
     period_ns: Option<f64>,
-    /// Pictures of a while ago, number and host time, that the usual time is reckoned from.
+    /// Earlier pictures (number and host time) from which the usual time is computed.
     since: [Option<(u64, u64)>; 2],
-    /// The camera was gone since the last picture; the number that was expected when it went.
+    /// Whether the camera was lost since the last picture; and the number that was expected when it was lost.
     gone: bool,
     before: Option<u64>,
 }
 
-/// The rate is that of one to two such times, ns.
+/// The rate is measured over one to two times this duration, ns.
 const WHILE: u64 = 10_000_000_000;
 
-/// What the number of a picture says.
+/// What the number of a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// It is the next one, or some before it are missing.
+    /// It is the next one; some before it may be missing.
     Next,
-    /// A later one was here before.
+    /// A later one arrived before it.
     Late,
 }
 
 impl Ledger {
-    /// A whole picture came.
+    /// A complete picture arrived.
     pub fn came(&mut self, id: u64, host_ns: u64) -> Order {
         self.back(id, host_ns);
         self.follow(id, host_ns);
@@ -135,14 +135,15 @@ impl Ledger {
         order
     }
 
-    /// Part of a picture came.
+    /// An incomplete picture arrived.
     pub fn came_in_part(&mut self, id: u64) {
         self.back(id, now_ns());
         self.step(id);
         self.account.incomplete += 1;
     }
 
-    /// Counts the numbers that were left out before this one; one that was counted as missed is so no more.
+    /// Counts the numbers missing before this one as missed. A number that arrives after it was counted as missed is
+    /// removed from that count.
     fn step(&mut self, id: u64) -> Order {
         let expected = self.expected.unwrap_or(id);
         if id < expected {
@@ -163,7 +164,7 @@ impl Ledger {
         Order::Next
     }
 
-    /// The camera is gone; its numbers may begin anew when it is back.
+    /// The camera is lost; its numbers may restart when it comes back.
     pub fn gone(&mut self) {
         self.before = self.expected.take().or(self.before);
         self.since = [None; 2];
@@ -171,7 +172,7 @@ impl Ledger {
         self.since_open = 0;
     }
 
-    /// Nothing comes any more; a camera that is still gone is missed to the end.
+    /// Nothing arrives any more. For a camera that is still lost, pictures are counted as missed until now.
     pub fn ended(&mut self, host_ns: u64) {
         if let (true, Some(last), Some(period)) = (std::mem::take(&mut self.gone), self.last_ns, self.period_ns) {
             let missed = (host_ns.saturating_sub(last) as f64 / period).round() as u64;
@@ -181,8 +182,8 @@ impl Ledger {
         }
     }
 
-    /// What an outage cost: the numbers in between where the device counted on, else the time since the last picture
-    /// at the usual rate.
+    /// Adds the losses of an outage: the numbers in between if the device went on counting, else the time since the
+    /// last picture at the usual rate.
     fn back(&mut self, id: u64, host_ns: u64) {
         if !std::mem::take(&mut self.gone) {
             return;
@@ -192,7 +193,7 @@ impl Ledger {
             return;
         };
         let by_time = ((host_ns.saturating_sub(last) as f64 / period).round() as u64).saturating_sub(1);
-        // Numbers that began anew are smaller, or far from what the time says.
+        // Numbers that restarted are smaller, or far from what the time suggests.
         let missed = match id.checked_sub(before) {
             Some(by_number) if by_number.abs_diff(by_time) <= 2 + by_time / 4 => by_number,
             _ => by_time,
@@ -202,7 +203,7 @@ impl Ledger {
         self.last_ns = None;
     }
 
-    /// Arrivals come in bursts on a busy machine; over many pictures they tell the rate all the same.
+    /// On a busy machine pictures arrive in bursts, but over many pictures their arrivals still give the rate.
     fn follow(&mut self, id: u64, host_ns: u64) {
         self.last_ns = Some(host_ns);
         let (first, first_ns) = *self.since[0].get_or_insert((id, host_ns));
@@ -215,7 +216,8 @@ impl Ledger {
         }
     }
 
-    /// What the camera itself says it has sent since it was opened: those it sent and nobody saw are missed.
+    /// Takes the number of pictures that the camera reports to have sent since it was opened. Those that were never
+    /// seen count as missed.
     pub fn says(&mut self, sent: u64) {
         let unseen = sent.saturating_sub(self.since_open);
         self.account.missed += unseen;
@@ -223,12 +225,12 @@ impl Ledger {
         self.since_open += unseen;
     }
 
-    /// Pictures a second, as they came lately.
+    /// Recent rate of pictures, per second.
     pub fn rate_hz(&self) -> Option<f64> {
         self.period_ns.filter(|p| *p > 0.0).map(|p| 1e9 / p)
     }
 
-    /// The account so far, to be read and added to.
+    /// The account so far, for reading and for adding to it.
     pub fn account(&mut self) -> &mut Account {
         &mut self.account
     }
@@ -248,7 +250,7 @@ mod tests {
         ledger.says(12);
         let a = ledger.account();
         a.used = a.complete;
-        // 5..=16: 5 6 9 12 whole, 8 late, 11 and 13 in part; 7, 10, 14, 15, 16 never came.
+        // Numbers 5..=16: 5 6 9 12 complete, 8 late, 11 and 13 incomplete; 7, 10, 14, 15, 16 never arrived.
         assert_eq!((a.sent, a.complete, a.late, a.incomplete, a.missed), (12, 4, 1, 2, 5));
         assert_eq!(a.unexplained(), 0);
         a.used -= 1;
@@ -261,7 +263,7 @@ mod tests {
         let ms = 1_000_000;
         (0..50).for_each(|i| assert_eq!(ledger.came(i, i * 20 * ms), Order::Next));
         ledger.gone();
-        // 10 s at 50 a second, then its numbers begin at 1 again.
+        // 10 s at 50 a second, then the numbers restart at 1.
         assert_eq!(ledger.came(1, 49 * 20 * ms + 10_000 * ms), Order::Next);
         let a = ledger.account();
         a.used = a.complete;
@@ -269,7 +271,7 @@ mod tests {
         assert_eq!(a.unexplained(), 0);
     }
 
-    /// The first ones wait somewhere and come at once: the rate is that of all.
+    /// The first ones are held up and arrive together; the rate is that of all pictures.
     #[test]
     fn bursts_are_no_rate() {
         let mut ledger = Ledger::default();
@@ -294,7 +296,7 @@ mod tests {
         assert_eq!((a.missed, a.outages, a.sent, a.unexplained()), (100, 1, 150, 0));
     }
 
-    /// Back so soon that the time says nothing was lost, while the numbers say that one was.
+    /// The camera is back so soon that the time suggests no loss, while the numbers show one.
     #[test]
     fn a_device_that_counts_on_through_an_outage_is_believed() {
         let mut ledger = Ledger::default();

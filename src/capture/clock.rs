@@ -1,19 +1,19 @@
-//! In: the system's clock. Out: the host's time, which runs evenly while the program runs; what another clock said
-//! between two of its moments; how one clock runs against the other.
+//! In: the system's clock. Out: the host's time, which runs evenly while the program runs; the reading of another
+//! clock between two host times; the relation of one clock to the other.
 //! Frame and unit: ns; the host's time counts from the Unix epoch.
 
 use std::collections::VecDeque;
 use std::sync::OnceLock;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-/// The host's time, ns since the Unix epoch. The system's clock is asked once; from then on the steady one counts, so
-/// that nobody who sets the clock makes time jump.
+/// The host's time, ns since the Unix epoch. The system's clock is read once; from then on the steady clock counts,
+/// so that setting the system's clock does not make the time jump.
 pub fn now_ns() -> u64 {
     ns_of(Instant::now())
 }
 
-/// A moment of the steady clock as the host's time, ns since the Unix epoch. The order and the distance of moments
-/// stay as they are, whatever happens between the reading of a clock and this.
+/// A moment of the steady clock as the host's time, ns since the Unix epoch. Order and distances of moments are
+/// preserved, whenever they are converted.
 pub fn ns_of(moment: Instant) -> u64 {
     static START: OnceLock<(u64, Instant)> = OnceLock::new();
     let (epoch, began) = START.get_or_init(|| {
@@ -26,23 +26,23 @@ pub fn ns_of(moment: Instant) -> u64 {
     }
 }
 
-/// Another clock was read between two moments of the host's.
+/// A reading of another clock between two host times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RoundTrip {
-    /// Host, ns: the question left.
+    /// Host's time when the question was sent, ns.
     pub before_ns: u64,
-    /// The other clock, ns: its answer.
+    /// The other clock's answer, ns.
     pub there_ns: u64,
-    /// Host, ns: the answer was here.
+    /// Host's time when the answer arrived, ns.
     pub after_ns: u64,
 }
 
-/// Best readings are kept for each stretch of this length, ns, and so many of them.
+/// The best reading of each interval of this length, ns, is kept, for this many intervals.
 const STRETCH: u64 = 2_000_000_000;
 const STRETCHES: usize = 32;
-/// What two quartz clocks differ by at most before anything was measured.
+/// Assumed largest rate difference of two quartz clocks before it is measured.
 const DRIFT: f64 = 100e-6;
-/// From this span on, ns, a difference in rate is measured rather than feared.
+/// From this span of readings on, ns, the rate difference is measured instead of bounded.
 const SPAN: f64 = 4e9;
 
 /// A moment of the host's time.
@@ -50,7 +50,7 @@ const SPAN: f64 = 4e9;
 pub struct Moment {
     /// ns since the Unix epoch.
     pub ns: f64,
-    /// 1 sigma, ns.
+    /// Standard deviation, ns.
     pub sigma_ns: f64,
 }
 
@@ -59,37 +59,38 @@ struct Reading {
     there: f64,
     /// Host's time minus the other clock's, ns.
     offset: f64,
-    /// The truth lies within so much of it; of a one-way reading the excess over the best one is not known: infinite.
+    /// Bound of the error, ns. For a one-way reading the excess over the shortest delay is unknown: infinite.
     half: f64,
 }
 
-/// How another clock runs against the host's: by the shortest round trips, or, where it cannot be asked, by the
-/// earliest arrivals (then the shortest delay of the way is part of the offset).
+/// Relation of another clock to the host's. It uses the shortest round trips. For a clock that cannot be queried it
+/// uses the earliest arrivals; then the shortest transmission delay is part of the offset.
 #[derive(Clone, Debug, Default)]
 pub struct ClockMap {
     best: VecDeque<Reading>,
-    /// Scatter of late arrivals is no error; that of the earliest is.
+    /// Whether readings are one-way: then the scatter of late arrivals is no error, but that of the earliest is.
     one_way: bool,
-    /// There, the first reading: times are told from here, so that f64 holds them.
+    /// First reading of both clocks: times are stored relative to it, so that f64 is accurate enough.
     origin: Option<(u64, u64)>,
-    /// The host's time of the last reading.
+    /// Host's time of the last reading.
     newest: u64,
     jumps: u32,
-    /// Nobody knows what the other clock said up to this moment of the host's: it jumped.
+    /// Up to this host's time the other clock's readings are unknown, because it jumped.
     unsure_until: u64,
 }
 
-/// Readings that disagree by more than their ways and a drift explain, and by this, ns, are of a clock that was set.
+/// If readings disagree by more than transmission times and drift explain, plus this tolerance, ns, the clock was
+/// set.
 const ODD: f64 = 2e5;
 
 impl ClockMap {
-    /// Takes in a reading with both ends.
+    /// Adds a reading by round trip.
     pub fn round_trip(&mut self, trip: RoundTrip) {
         let here = trip.before_ns + (trip.after_ns - trip.before_ns) / 2;
         self.add(trip.there_ns, here, 0.5 * (trip.after_ns - trip.before_ns) as f64);
     }
 
-    /// Takes in that something that was told at `there_ns` arrived at `here_ns`.
+    /// Adds a reading in one direction: a message stamped `there_ns` arrived at `here_ns`.
     pub fn one_way(&mut self, there_ns: u64, here_ns: u64) {
         self.one_way = true;
         self.add(there_ns, here_ns, f64::INFINITY);
@@ -97,7 +98,7 @@ impl ClockMap {
 
     fn add(&mut self, there_ns: u64, here_ns: u64, half: f64) {
         let reading = self.reading(there_ns, here_ns, half);
-        // A clock that was set, or that began anew: what was known of it is of no use.
+        // The clock was set or restarted: earlier readings are useless.
         if self.best.back().is_some_and(|b| !self.agree(b, &reading)) {
             self.begin_anew(here_ns + if half.is_finite() { half as u64 } else { 0 });
             return self.add(there_ns, here_ns, half);
@@ -126,33 +127,35 @@ impl ClockMap {
         Reading { there, offset: (here_ns as f64 - here0 as f64) - there, half }
     }
 
-    /// Two readings, the older one first, are of one clock that ran on.
+    /// Whether two readings, the older one first, are of a clock that ran on without a jump.
     fn agree(&self, b: &Reading, reading: &Reading) -> bool {
         let behind = reading.there + 1.0 < b.there - STRETCH as f64;
         let ways = if self.one_way { 0.5e9 } else { reading.half + b.half + ODD };
         !behind && (reading.offset - b.offset).abs() <= ways + DRIFT * (reading.there - b.there).abs()
     }
 
-    /// Whether a round trip shows that the other clock ran on since it was read last: it was not reset, and had power.
+    /// Whether a round trip shows that the other clock ran on since its last reading: it was not reset and kept its
+    /// power.
     pub fn ran_on(&self, trip: RoundTrip) -> bool {
         let here = trip.before_ns + (trip.after_ns - trip.before_ns) / 2;
         let reading = self.reading(trip.there_ns, here, 0.5 * (trip.after_ns - trip.before_ns) as f64);
         !self.one_way && self.best.back().is_some_and(|b| self.agree(b, &reading))
     }
 
-    /// Forgets what is known of the other clock. What was here up to `until_ns` of the host's time can be told no more.
+    /// Discards all readings of the other clock. What arrived up to `until_ns` of the host's time can no longer be
+    /// converted.
     pub fn begin_anew(&mut self, until_ns: u64) {
         let jumps = self.jumps + 1;
         *self = ClockMap { jumps, unsure_until: until_ns, one_way: self.one_way, ..ClockMap::default() };
     }
 
-    /// How often the other clock jumped or began anew.
+    /// Number of times that the other clock jumped or restarted.
     pub fn jumps(&self) -> u32 {
         self.jumps
     }
 
-    /// When the other clock said this, by the host's, of something that was here at `here_ns`: `None` where the clock
-    /// has not been read since, so that it may have jumped; `Err` where it did.
+    /// Converts a time of the other clock, for something that arrived at `here_ns`, to the host's time. `None` if
+    /// the clock has not been read since, so that it may have jumped; `Err` if it did.
     pub fn told(&self, there_ns: u64, here_ns: u64) -> Option<Result<Moment, String>> {
         if here_ns <= self.unsure_until {
             return Some(Err("the camera's clock jumped around it".into()));
@@ -163,7 +166,7 @@ impl ClockMap {
         self.host(there_ns).map(Ok)
     }
 
-    /// When the other clock said this, by the host's; none before anything was read.
+    /// Converts a time of the other clock to the host's; `None` before the first reading.
     pub fn host(&self, there_ns: u64) -> Option<Moment> {
         let (there0, here0) = self.origin?;
         let there = there_ns as f64 - there0 as f64;
@@ -171,10 +174,10 @@ impl ClockMap {
         Some(Moment { ns: here0 as f64 + there + offset, sigma_ns })
     }
 
-    /// Offset at a time of the other clock, and its sigma.
+    /// Offset at a time of the other clock, with its sigma.
     fn offset(&self, there: f64) -> Option<(f64, f64)> {
         let (first, last) = (self.best.front()?, self.best.back()?);
-        // Half of a round trip bounds the error: evenly spread within it.
+        // Half of a round trip bounds the error, which is taken as uniform within that bound.
         let sigma = |r: &Reading| if r.half.is_finite() { (r.half / 3f64.sqrt()).max(100.0) } else { 1e5 };
         let nearest = self.best.iter().min_by(|a, b| {
             let cost = |r: &Reading| sigma(r) + DRIFT * (r.there - there).abs();
@@ -196,7 +199,7 @@ impl ClockMap {
         let n = self.best.len() as f64;
         let residual = (self.best.iter().map(|r| (r.offset - at(r.there)).powi(2)).sum::<f64>() / (n - 2.0)).sqrt();
         let stated = (1.0 / w).sqrt() * n.sqrt();
-        // Asymmetric ways err all in one direction: the mean is no better than one of them.
+        // Asymmetric transmission times cause errors of one sign: the mean is no better than a single reading.
         let sigma = residual.max(if self.one_way { 0.0 } else { stated });
         Some((at(there), sigma * (1.0 + (there - mx).powi(2) / spread / n).sqrt()))
     }
@@ -208,7 +211,7 @@ mod tests {
 
     #[test]
     fn a_drifting_clock_is_told_by_its_shortest_round_trips() {
-        // 50 ppm fast, 1e15 ns off; ways of 0.1 to 5 ms, one direction slower than the other.
+        // 50 ppm fast, 1e15 ns off; transmission times of 0.1 to 5 ms, one direction slower than the other.
         let there = |here: u64| 1_000_000_000_000_000 + here + here / 20_000;
         let mut map = ClockMap::default();
         let mut state = 1u64;
@@ -229,7 +232,8 @@ mod tests {
         assert!((map.host(5).unwrap().ns - 41_000_050_000.0).abs() < 1.0);
     }
 
-    /// A jump of 30 ms, which the ways of half a millisecond do not explain: what came around it has no time.
+    /// A jump of 30 ms, which transmission times of half a millisecond do not explain: arrivals around it get no
+    /// time.
     #[test]
     fn a_small_jump_is_seen_and_what_came_around_it_is_not_told() {
         let mut map = ClockMap::default();
@@ -258,7 +262,7 @@ mod tests {
         assert!((told.ns - (last + 300_000_000) as f64).abs() < 1e6, "{told:?}");
     }
 
-    /// Moments read by turns with others, so that nothing but their own distance may count.
+    /// The moments are converted in arbitrary order; only their distances matter.
     #[test]
     fn moments_of_the_steady_clock_keep_their_distances_to_the_nanosecond() {
         let first = Instant::now();

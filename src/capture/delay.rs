@@ -1,20 +1,19 @@
-//! In: how long each picture took from its last byte to its points. Out: median and 99th percentile, in memory that
-//! does not grow.
+//! In: the time from each picture's last byte to its points. Out: median and 99th percentile, in constant memory.
 //! Frame and unit: ms.
 
-/// Classes a hundredth wide, from a microsecond to a thousand seconds.
+/// Classes 1 % wide, from a microsecond to a thousand seconds.
 const LEAST_MS: f64 = 1e-3;
 const WIDTH: f64 = 0.01;
 const CLASSES: usize = 2080;
 
-/// How long pictures took, counted in classes of a hundredth.
+/// Processing times of pictures, counted in classes 1 % wide.
 #[derive(Clone, Debug)]
 pub struct Delays {
     classes: Vec<u32>,
     count: u64,
 }
 
-/// What half of the pictures, and what ninety-nine of a hundred, stayed below.
+/// The times below which half and 99 % of the pictures stayed.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Delay {
@@ -31,24 +30,24 @@ impl Default for Delays {
 }
 
 impl Delays {
-    /// Takes one in.
+    /// Adds a time.
     pub fn add(&mut self, ms: f64) {
         let class = ((ms / LEAST_MS).max(1.0).ln() / WIDTH) as usize;
         self.classes[class.min(CLASSES - 1)] += 1;
         self.count += 1;
     }
 
-    /// Takes in what lies between now and a moment of the host's.
+    /// Adds the time from a moment of the host's clock until now.
     pub fn since(&mut self, here_ns: u64) {
         self.add(super::now_ns().saturating_sub(here_ns) as f64 * 1e-6);
     }
 
-    /// What they come to; none before there was one.
+    /// The percentiles so far; `None` before the first picture.
     pub fn so_far(&self) -> Option<Delay> {
         (self.count > 0).then(|| Delay { p50_ms: self.percentile(0.5), p99_ms: self.percentile(0.99) })
     }
 
-    /// The middle of the class in which the share is reached, to three digits.
+    /// The middle of the class in which the share is reached, rounded to three digits.
     fn percentile(&self, share: f64) -> f64 {
         let wanted = (share * self.count as f64).ceil().max(1.0) as u64;
         let mut below = 0u64;

@@ -1,47 +1,47 @@
-//! In: what a camera lets be set. Out: its names, values, units and ranges.
-//! Frame and unit: as the GenICam Standard Features Naming Convention has them: ExposureTime in us, Gain in dB,
-//! lengths in px.
+//! In: the settings that a camera offers. Out: their names, values, units and ranges.
+//! Frame and unit: those of the GenICam Standard Features Naming Convention: ExposureTime in us, Gain in dB, lengths
+//! in px.
 
-/// What a feature can be.
+/// Value of a feature.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 #[serde(untagged)]
 pub enum Value {
     /// A whole number.
     Integer(i64),
-    /// A number.
+    /// A floating-point number.
     Float(f64),
-    /// Yes or no.
+    /// True or false.
     Boolean(bool),
-    /// A word: one of a list, or free.
+    /// A word: one of a list, or free text.
     Word(String),
-    /// Something that is done, not a value.
+    /// An action, which has no value.
     Command,
 }
 
-/// What a feature may be set to.
+/// Values that a feature accepts.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 #[serde(untagged)]
 pub enum Range {
-    /// From, to, both included.
+    /// Lowest and highest value, both included.
     Between(f64, f64),
-    /// One of these.
+    /// One of these words.
     OneOf(Vec<String>),
-    /// Not known, or anything.
+    /// Unknown, or unrestricted.
     Any,
 }
 
 /// One setting of a camera.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Feature {
-    /// By the naming convention, e.g. `ExposureTime`.
+    /// Name by the naming convention, e.g. `ExposureTime`.
     pub name: String,
-    /// What it is now; none where it cannot be read.
+    /// Present value; none if it cannot be read.
     pub value: Option<Value>,
-    /// `us`, `dB`, `px`, `Hz`; empty where it has none.
+    /// `us`, `dB`, `px`, `Hz`; empty if it has none.
     pub unit: String,
-    /// What it can be set to.
+    /// Values that it accepts.
     pub range: Range,
-    /// Whether it can be set now.
+    /// Whether it can be set at present.
     pub writable: bool,
 }
 

@@ -1,5 +1,5 @@
-//! In: a source, a mode. Out: its pictures through a bounded queue, while a thread of its own asks for them; an
-//! account of all of them; a camera that went away and came back.
+//! In: a source, a mode. Out: its pictures through a bounded queue, filled by a separate thread; an account of all
+//! of them. A camera that was lost is opened again.
 //! Frame and unit: pictures, bytes; times in ns.
 
 use super::account::{Account, Ledger, Order};
@@ -14,31 +14,31 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Which pictures matter.
+/// Which pictures are delivered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// Every one, in order: recording and scanning.
+    /// Every one, in order: for recording and scanning.
     All,
-    /// The newest: looking. One that was not taken before the next came is dropped.
+    /// The newest: for live view. A picture that was not taken before the next arrived is dropped.
     Newest,
 }
 
-/// How a source is fed.
+/// Options of a feed.
 #[derive(Clone, Debug)]
 pub struct FeedOptions {
-    /// Which pictures matter.
+    /// Which pictures are delivered.
     pub mode: Mode,
-    /// Memory for pictures that wait, bytes.
+    /// Memory for waiting pictures, bytes.
     pub memory: usize,
-    /// How long a camera that went away is waited for; zero: not at all.
+    /// How long to wait for a lost camera; zero: do not wait.
     pub patience: Duration,
-    /// Ends after so many complete pictures.
+    /// Ends after this number of complete pictures.
     pub shots: Option<u64>,
-    /// Ends after this time.
+    /// Ends after this time, s.
     pub seconds: Option<f64>,
-    /// Set by somebody who wants it to end.
+    /// Set by the caller to end the feed.
     pub stop: Arc<AtomicBool>,
-    /// How pictures are read from the sensor, by a person's word, where the source does not know.
+    /// Readout that the user states, if the source does not know it.
     pub readout: Option<Readout>,
 }
 
@@ -57,7 +57,7 @@ impl Default for FeedOptions {
     }
 }
 
-/// What becomes of a picture after it came.
+/// What became of a picture after it arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fate {
     /// Recorded, scanned or shown.
@@ -66,28 +66,28 @@ pub enum Fate {
     Disk,
     /// Processing was too slow.
     Processing,
-    /// Nobody knows where what moves stood.
+    /// The position of what moves is unknown.
     Unpaired,
 }
 
-/// What comes of waiting for a feed.
+/// Result of waiting for a feed.
 #[derive(Debug)]
 pub enum Fed {
-    /// The next picture, or the newest, and what its number can be compared with.
+    /// The next picture, or the newest, and how far its number is comparable.
     Picture(Box<Picture>, Numbering),
-    /// The time is over, nothing came.
+    /// The time has passed and nothing arrived.
     Quiet,
-    /// Nothing will come any more, and why where it is nobody's wish.
+    /// Nothing will arrive any more; with the reason, unless the end was requested.
     Ended(Option<Fault>),
 }
 
-/// How often a wish to stop is looked for.
+/// Interval of checks for a request to stop.
 const GLANCE: Duration = Duration::from_millis(100);
-/// How long a camera has to be given back.
+/// Time that a camera may take to be released.
 const GIVE_BACK: Duration = Duration::from_millis(1000);
-/// From one attempt to bring a camera back to the next.
+/// Interval of attempts to open a lost camera again.
 const RETRY: Duration = Duration::from_millis(500);
-/// From one reading of the device's clock to the next, and how many at the beginning.
+/// Interval of readings of the device's clock, and the number of readings at the beginning.
 const CLOCK: Duration = Duration::from_millis(200);
 const CLOCK_FIRST: usize = 8;
 
@@ -100,7 +100,7 @@ struct State {
     resent: u64,
     ended: bool,
     fault: Option<Fault>,
-    /// What a person should hear of: the camera went, the camera is back.
+    /// Messages for the user: the camera was lost, the camera is back.
     said: Vec<String>,
 }
 
@@ -127,10 +127,10 @@ pub struct Feed {
 }
 
 impl Feed {
-    /// Starts asking.
+    /// Starts requesting pictures.
     ///
     /// # Errors
-    /// No thread can be started; the readout is stated, and the source knows it.
+    /// No thread can be started; a readout is stated although the source knows it.
     pub fn start(source: Box<dyn PictureSource>, options: FeedOptions) -> Result<Feed> {
         let (name, device) = (source.name(), source.device());
         let readout = stated_once(source.readout(), options.readout)?;
@@ -159,22 +159,22 @@ impl Feed {
         self.pictures.format
     }
 
-    /// What all its pictures are, and how they are read from the sensor.
+    /// Format of all its pictures, and how they are read from the sensor.
     pub fn pictures(&self) -> Pictures {
         self.pictures
     }
 
-    /// What it is and where.
+    /// Kind and place of the source, for messages.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Which device it is, however it was named.
+    /// Identity of the device, however it was named.
     pub fn device(&self) -> &str {
         &self.device
     }
 
-    /// The next picture, waited for at most this long.
+    /// The next picture, waiting for at most `within`.
     pub fn next(&self, within: Duration) -> Fed {
         let until = Instant::now() + within;
         let mut state = self.shared.lock();
@@ -196,7 +196,7 @@ impl Feed {
         }
     }
 
-    /// Notes what became of a picture that [`Feed::next`] gave.
+    /// Notes what became of a picture that [`Feed::next`] returned.
     pub fn fate(&self, fate: Fate) {
         let mut state = self.shared.lock();
         let a = state.ledger.account();
@@ -208,34 +208,34 @@ impl Feed {
         } += 1;
     }
 
-    /// The account so far; pictures under way are complete and not yet anything more.
+    /// The account so far; pictures in flight count as complete only.
     pub fn account(&self) -> Account {
         let mut state = self.shared.lock();
         let resent = state.resent;
         Account { resent, ..state.ledger.account().clone() }
     }
 
-    /// Pictures a second, as they came lately.
+    /// Recent rate of pictures, per second.
     pub fn rate_hz(&self) -> Option<f64> {
         self.shared.lock().ledger.rate_hz()
     }
 
-    /// How the device's clock runs against the host's, as far as it is known.
+    /// Relation of the device's clock to the host's, as far as it is known.
     pub fn clock(&self) -> ClockMap {
         self.shared.lock().clock.clone()
     }
 
-    /// Pictures that wait in memory.
+    /// Number of pictures that wait in memory.
     pub fn waiting(&self) -> usize {
         self.shared.lock().pictures.len()
     }
 
-    /// What happened since it was asked last: the camera went, the camera is back.
+    /// Messages since the last call: the camera was lost, the camera is back.
     pub fn news(&self) -> Vec<String> {
         std::mem::take(&mut self.shared.lock().said)
     }
 
-    /// Asks for no more; what waits can still be taken.
+    /// Requests no more pictures; waiting ones can still be taken.
     pub fn stop(&self) {
         self.stop.store(true, Ordering::Relaxed);
         self.shared.changed.notify_all();
@@ -245,7 +245,7 @@ impl Feed {
 impl Drop for Feed {
     fn drop(&mut self) {
         self.stop();
-        // A camera is given back; a reader that waits inside a pipe is left alone, and ends with the pipe.
+        // A camera is released. A reader that blocks inside a pipe is left alone and ends with the pipe.
         let until = Instant::now() + GIVE_BACK;
         while self.thread.as_ref().is_some_and(|t| !t.is_finished()) && Instant::now() < until {
             std::thread::sleep(GLANCE / 10);
@@ -260,16 +260,16 @@ fn weight(picture: &Picture) -> usize {
     Format::of(&picture.image).bytes() + std::mem::size_of::<Picture>()
 }
 
-/// The thread that asks.
+/// The thread that requests pictures.
 struct Reader {
     source: Box<dyn PictureSource>,
     shared: Arc<Shared>,
     options: FeedOptions,
     ours: Arc<AtomicBool>,
     begun: Instant,
-    /// When the clock was read last.
+    /// Time of the last reading of the clock.
     asked: Option<Instant>,
-    /// A person was told that the clock jumps.
+    /// Whether the user was informed that the clock jumps.
     jump_said: bool,
     came: u64,
     /// The first number since the source was opened.
@@ -311,7 +311,7 @@ impl Reader {
         };
         let Reader { source, shared, .. } = self;
         let resent = source.resent();
-        // Whoever hears of the end can have the camera: it was given back.
+        // Whoever learns of the end can open the camera, because it was released before.
         drop(source);
         let mut state = shared.lock();
         state.ledger.ended(now_ns());
@@ -331,13 +331,14 @@ impl Reader {
     }
 
     fn read_clock(&mut self) {
-        // A device that does not answer is lost by its pictures, not by its clock.
+        // A device that does not answer is declared lost when it stops sending pictures, not when a clock reading
+        // fails.
         if let Ok(Some(trip)) = self.source.clock() {
             self.asked = Some(Instant::now());
             let mut state = self.shared.lock();
             let jumps = state.clock.jumps();
             state.clock.round_trip(trip);
-            // Once: one that jumps all the time would say nothing else.
+            // Only once: a clock that jumps constantly would drown all other messages.
             if state.clock.jumps() > jumps && !std::mem::replace(&mut self.jump_said, true) {
                 let name = self.source.name();
                 state
@@ -383,13 +384,13 @@ impl Reader {
         self.shared.changed.notify_all();
     }
 
-    /// The source is back: what can still be compared with what was before, and a new reading of its clock.
+    /// The source is back: notes which numbers are still comparable, and reads its clock again.
     fn opened_again(&mut self) {
         let trip = self.source.clock().ok().flatten();
         let mut state = self.shared.lock();
         let ran_on = trip.is_some_and(|trip| state.clock.ran_on(trip));
         if !ran_on {
-            // Pictures that still wait to be paired carry times of the clock as it was.
+            // Pictures that still wait to be paired have times of the clock before its restart.
             state.clock.begin_anew(now_ns());
         }
         drop(state);
@@ -399,7 +400,7 @@ impl Reader {
         (0..CLOCK_FIRST).for_each(|_| self.read_clock());
     }
 
-    /// Waits for a camera that went away. `Err` where it does not come back, with why unless somebody wanted the end.
+    /// Waits for a lost camera. `Err` if it does not come back; with the reason, unless the end was requested.
     fn bring_back(&mut self, fault: Fault) -> std::result::Result<(), Option<Fault>> {
         if !self.source.reopens() || self.options.patience.is_zero() {
             return Err(Some(fault));

@@ -1,6 +1,7 @@
-//! In: how raw frames are laid out in words, a reader of their bytes. Out: their size and depth; one picture after
+//! In: the layout of raw frames in words, a reader of their bytes. Out: their size and depth; one picture after
 //! another.
-//! Frame and unit: pixels; grey levels of the sensor's depth, those of more than 8 bits as two bytes, little endian.
+//! Frame and unit: pixels; grey levels of the sensor's depth; more than 8 bits are stored as two bytes, little
+//! endian.
 
 use crate::camera::Readout;
 use crate::fault::{Fault, Result};
@@ -18,12 +19,12 @@ pub struct Format {
     pub bits: u8,
 }
 
-/// What pictures are, and how they were read from the sensor where that is known.
+/// Format of pictures, and how they were read from the sensor, if known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pictures {
     /// Size and depth.
     pub format: Format,
-    /// Region, binning and decimation; none where nobody says.
+    /// Region, binning and decimation; none if unknown.
     pub readout: Option<Readout>,
 }
 
@@ -41,7 +42,7 @@ impl From<Format> for Pictures {
 }
 
 impl Format {
-    /// What a picture is.
+    /// Format of a picture.
     pub fn of(image: &Image) -> Format {
         Format { width: image.width, height: image.height, bits: image.bits }
     }
@@ -51,7 +52,7 @@ impl Format {
         self.width as usize * self.height as usize * if self.bits > 8 { 2 } else { 1 }
     }
 
-    /// The picture of a raw frame's bytes. Refused: another number of bytes, a level above the depth.
+    /// Converts a raw frame's bytes to a picture. Refuses another number of bytes, and a level above the depth.
     pub fn image(&self, bytes: Vec<u8>) -> Result<Image> {
         let Format { width, height, bits } = *self;
         if bytes.len() != self.bytes() {
@@ -77,7 +78,7 @@ impl Format {
     }
 }
 
-/// The bytes of a picture as a raw frame has them.
+/// The bytes of a picture, laid out as a raw frame.
 pub fn raw_bytes(image: &Image) -> std::borrow::Cow<'_, [u8]> {
     match &image.pixels {
         Pixels::U8(levels) => levels.into(),
@@ -94,13 +95,13 @@ impl std::fmt::Display for Format {
 /// Pixel layouts of `ffmpeg -f rawvideo` that carry one grey channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RawFormat {
-    /// Size and depth of a frame; levels of more than 8 bits come as two bytes, little endian.
+    /// Size and depth of a frame; more than 8 bits are stored as two bytes, little endian.
     pub format: Format,
 }
 
 impl std::str::FromStr for RawFormat {
     type Err = String;
-    /// `4096x3072:gray8`, `gray10le`, `gray12le` or `gray16le`.
+    /// Parses `4096x3072:gray8`, or `gray10le`, `gray12le`, `gray16le`.
     fn from_str(s: &str) -> std::result::Result<RawFormat, String> {
         let help = || format!("'{s}' is not like 4096x3072:gray8 (or gray10le, gray12le, gray16le)");
         let (size, layout) = s.split_once(':').ok_or_else(help)?;
@@ -120,14 +121,14 @@ impl std::str::FromStr for RawFormat {
     }
 }
 
-/// Raw frames from a reader, as they come.
+/// Raw frames from a reader, in order.
 pub struct RawFrames<R: Read> {
     format: Format,
     reader: R,
 }
 
 impl<R: Read> RawFrames<R> {
-    /// Takes frames of this size and depth from `reader`.
+    /// Reads frames of this size and depth from `reader`.
     pub fn new(raw: RawFormat, reader: R) -> RawFrames<R> {
         RawFrames { format: raw.format, reader }
     }
@@ -137,7 +138,7 @@ impl<R: Read> RawFrames<R> {
         self.format
     }
 
-    /// Reads one frame: `Ok(None)` at a clean end, an error where the pipe ends inside a frame.
+    /// Reads one frame: `Ok(None)` at a clean end, an error if the pipe ends inside a frame.
     pub fn read(&mut self) -> Result<Option<Image>> {
         let mut bytes = vec![0u8; self.format.bytes()];
         let mut have = 0;

@@ -1,5 +1,5 @@
-//! In: a station's folder. Out: by how much its pictures' times are late against its poses', as it was calibrated, of
-//! which camera and which poses.
+//! In: a station's folder. Out: the calibrated delay of its pictures' times against its poses', with the camera and
+//! the poses that it belongs to.
 //! Frame and unit: ms.
 
 use crate::fault::{Fault, Result};
@@ -11,30 +11,30 @@ use std::path::Path;
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Latency {
-    /// The pictures' times are late by so much: the pose of a picture is the one of so long before.
+    /// Delay of the pictures' times: a picture belongs to the pose of this time earlier.
     pub delay_ms: f64,
-    /// 1 sigma.
+    /// Standard deviation of the delay.
     pub sigma_ms: f64,
-    /// When it was found, UTC.
+    /// Time of the calibration, UTC.
     #[serde(default)]
     pub created: String,
-    /// From what.
+    /// Recordings that it was computed from.
     #[serde(default)]
     pub recordings: Vec<String>,
-    /// Of which camera against whose poses; none: its recording does not say.
+    /// Camera and poses that it belongs to; none if its recording does not state them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sources: Option<Sources>,
 }
 
-/// A delay above this is no delay, ms.
+/// Largest accepted delay, ms.
 const MOST: f64 = 1000.0;
 const AGAIN: &str = "find it again: sheetlight calibrate latency; or take calibration/latency.json away";
 
 impl Latency {
-    /// Reads `calibration/latency.json` of a station; none where it was not calibrated.
+    /// Reads `calibration/latency.json` of a station; none if it was not calibrated.
     ///
     /// # Errors
-    /// A file that is none, or that was changed.
+    /// A file of another kind, or an edited one.
     pub fn load(station: &Path) -> Result<Option<Latency>> {
         let path = station.join("calibration").join("latency.json");
         let Some(text) = crate::files::read_text_if_there(&path)? else { return Ok(None) };
@@ -48,11 +48,11 @@ impl Latency {
         Ok(Some(latency))
     }
 
-    /// Whether it is the delay between this camera and these poses. Where one of both does not say what it is of, it
-    /// is believed.
+    /// Checks that it is the delay between this camera and these poses. If either side does not state its sources,
+    /// it is accepted.
     ///
     /// # Errors
-    /// It is of another camera, or of another robot's or axis' poses.
+    /// It belongs to another camera, or to poses of another robot or axis.
     pub fn of(&self, sources: Option<&Sources>) -> Result<()> {
         let (Some(mine), Some(theirs)) = (&self.sources, sources) else { return Ok(()) };
         if mine == theirs {
@@ -68,10 +68,10 @@ impl Latency {
         .next(AGAIN))
     }
 
-    /// Writes it into a station.
+    /// Writes it to a station.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The file cannot be written.
     pub fn store(&self, station: &Path) -> Result<()> {
         let folder = station.join("calibration");
         crate::files::make_folder(&folder)?;

@@ -1,4 +1,4 @@
-//! In: pictures of a stripe. Out: their levels, and along the stripe how bright, how wide and how dark it is.
+//! In: pictures of a stripe. Out: their levels, and the stripe's brightness, width and gaps along its length.
 //! Frame and unit: px; shares of full scale and of the stripe's length.
 
 use crate::raster::Image;
@@ -12,28 +12,28 @@ pub struct Look {
     pub saturated: f64,
     /// Pixels by level, sixteen ranges of the same width.
     pub histogram: [u64; 16],
-    /// None where no line of the picture shows one.
+    /// The stripe; none if no line of the picture shows one.
     pub stripe: Option<StripeLook>,
 }
 
-/// A stripe, looked at across, line by line of the picture.
+/// A stripe, examined across, in each line of the picture.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct StripeLook {
-    /// It lies: it is looked at column by column.
+    /// Whether the stripe is lying, so that it is examined column by column.
     pub lying: bool,
-    /// Level that a twentieth of its peaks are above, as share of full scale.
+    /// Level exceeded by a twentieth of its peaks, as share of full scale.
     pub peak: f64,
     /// Share of its peaks that are saturated.
     pub saturated: f64,
     /// Full width at half height, px, median.
     pub width_px: f64,
-    /// Its peak against the level beside it, median.
+    /// Ratio of its peak to the level beside it, median.
     pub contrast: f64,
     /// Share of the lines without a stripe.
     pub dark: f64,
-    /// Peak (share of full scale) in eight parts along it; 0 where dark.
+    /// Peak (share of full scale) in eight parts along the stripe; 0 where dark.
     pub along: [f64; 8],
-    /// The same looks in as many pieces of the same length, from the left or the top.
+    /// The same figures in pieces of equal length, from the left or the top.
     pub pieces: Vec<Piece>,
 }
 
@@ -44,29 +44,31 @@ pub struct Piece {
     pub peak: f64,
     /// Full width at half height, px, median; 0 where dark.
     pub width_px: f64,
-    /// Peak against the level beside it, median; 0 where dark.
+    /// Ratio of the peak to the level beside it, median; 0 where dark.
     pub contrast: f64,
     /// Share of its lines without a stripe.
     pub dark: f64,
 }
 
-/// Pieces that a stripe is looked at in.
+/// Number of pieces that a stripe is divided into.
 pub const PIECES: usize = 32;
 
-/// Where the peak is to stand, and how many may be saturated.
+/// Wanted range of the peak, share of full scale.
 pub const WANTED: [f64; 2] = [0.70, 0.85];
-/// Share of saturated peaks that is still right.
+/// Largest acceptable share of saturated peaks.
 pub const MOST_SATURATED: f64 = 0.005;
-/// A peak stands out from its line by so many times the line's own scatter, and by this share of full scale.
+/// A peak must exceed its line's level by this many times the line's scatter, and by the share `LEAST` of full
+/// scale.
 const STANDS_OUT: f64 = 8.0;
 const LEAST: f64 = 0.03;
 
-/// Looks at a picture.
+/// Examines a picture.
 pub fn look(image: &Image) -> Look {
     look_at(std::slice::from_ref(image))
 }
 
-/// Looks at pictures of the same size and depth as at one: more peaks tell shares of a few per mille better.
+/// Examines pictures of the same size and depth as one: with more peaks, shares of a few per mille are more
+/// accurate.
 ///
 /// # Panics
 /// Without a picture.
@@ -96,13 +98,13 @@ pub fn look_at(images: &[Image]) -> Look {
         images.iter().for_each(|image| seen.add(image, lying));
         seen.stripe(lying)
     });
-    // The right way to look at a stripe shows it in more lines, and narrower.
+    // The right direction shows the stripe in more lines, and narrower.
     let score = |s: &Option<StripeLook>| s.as_ref().map_or(0.0, |s| (1.0 - s.dark) / s.width_px.max(1.0));
     let stripe = if score(&lying) >= score(&upright) { lying } else { upright };
     Look { levels, saturated, histogram, stripe }
 }
 
-/// What the lines of pictures show, looked at across the stripe.
+/// What the lines of pictures show across the stripe.
 #[derive(Default)]
 struct Across {
     lines: usize,
@@ -114,7 +116,7 @@ struct Across {
     pieces: Vec<InPiece>,
 }
 
-/// What the lines of a piece show: how many there are, peaks, widths and contrasts of those that show something.
+/// What the lines of a piece show: their number, and peaks, widths and contrasts of those with a stripe.
 #[derive(Clone, Default)]
 struct InPiece {
     lines: usize,
@@ -132,7 +134,7 @@ impl InPiece {
     }
 }
 
-/// The value that this share of the others does not exceed.
+/// The value that this share of the values does not exceed.
 fn share(values: &mut [f64], share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     values[(share * (values.len() - 1) as f64) as usize]
@@ -174,7 +176,7 @@ impl Across {
         }
     }
 
-    /// None where hardly a line shows one.
+    /// The stripe; none if hardly any line shows one.
     fn stripe(mut self, lying: bool) -> Option<StripeLook> {
         let shown = self.peaks.len();
         if shown == 0 || shown * 50 < self.lines {
@@ -194,7 +196,7 @@ impl Across {
 }
 
 impl Look {
-    /// Whether the exposure is right.
+    /// Whether the exposure is within the wanted range.
     pub fn right(&self) -> bool {
         self.stripe.as_ref().is_some_and(|s| (WANTED[0]..=WANTED[1]).contains(&s.peak) && s.saturated <= MOST_SATURATED)
     }
@@ -250,7 +252,7 @@ mod tests {
             assert_eq!(stripe.lying, lying);
             assert!((stripe.width_px - 4.7).abs() < 1.0 && (stripe.peak - 0.79).abs() < 0.03, "{seen}");
             assert!((stripe.dark - 16.0 / if lying { 200.0 } else { 160.0 }).abs() < 0.01 && seen.right(), "{seen}");
-            // The shadow lies at the beginning, and only there.
+            // The shadow is at the beginning only.
             let dark: f64 = stripe.pieces.iter().map(|p| p.dark).sum::<f64>() / stripe.pieces.len() as f64;
             assert!(
                 stripe.pieces[0].dark == 1.0 && stripe.pieces[8..].iter().all(|p| p.dark == 0.0),

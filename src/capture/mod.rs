@@ -1,5 +1,5 @@
-//! In: a word that names a source of pictures (a URI). Out: frames with their ids and times, paired with poses, each
-//! one accounted for; recordings.
+//! In: a URI that names a source of pictures. Out: frames with their ids and times, paired with poses, each one
+//! accounted for; recordings.
 //! Frame and unit: times in ns; poses base_from_flange, mm.
 
 mod account;

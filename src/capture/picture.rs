@@ -1,5 +1,5 @@
-//! In: a camera, or whatever stands for one. Out: its pictures with id and times, and what became of those that did
-//! not come.
+//! In: a camera, or a substitute for one. Out: its pictures with id and times, and reports of those that did not
+//! arrive.
 //! Frame and unit: times in ns, the device's by its own clock, the host's by [`super::now_ns`]; grey levels of the
 //! sensor's depth.
 
@@ -12,74 +12,75 @@ use crate::raster::Image;
 use crate::recording::Stand;
 use std::time::Duration;
 
-/// A picture as it came.
+/// A picture as received.
 #[derive(Clone, Debug)]
 pub struct Picture {
     /// Grey levels of the sensor's depth.
     pub image: Image,
-    /// The device's number of it: one more for every picture that the device took, so that gaps are pictures that
-    /// were lost. Where the device counts nothing, those that came are counted.
+    /// The device's number of the picture. It increases by one for every picture that the device took, so that gaps
+    /// are lost pictures. If the device does not count, received pictures are counted.
     pub id: u64,
-    /// When its exposure began, by the device's own clock; none where the device says nothing.
+    /// Start of the exposure, by the device's own clock; none if the device does not state it.
     pub device_ns: Option<u64>,
-    /// When its last byte was here, by the host's clock.
+    /// Arrival of the last byte, by the host's clock.
     pub host_ns: u64,
-    /// How long it was exposed; none where nobody says.
+    /// Exposure time; none if unknown.
     pub exposure_ns: Option<u64>,
-    /// The encoder's or trigger's count that the camera sent along with it (chunk data).
+    /// The encoder's or trigger's count that the camera sent with the picture (chunk data).
     pub count: Option<i64>,
-    /// Where what moves stood in the middle of the exposure, of a source that knows: a recording that is played, a
-    /// simulated station.
+    /// Position of what moves in the middle of the exposure. Only sources that know it state it: a played recording,
+    /// a simulated station.
     pub stand: Option<Stand>,
 }
 
-/// How far the numbers of pictures can be compared: what happened to the source before a picture.
+/// How far the numbers of pictures are comparable: what happened to the source before a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Numbering {
-    /// The first number that was seen since the source was opened, also of a picture that came only in part.
+    /// The first number seen since the source was opened; that of an incomplete picture counts too.
     pub first: u64,
-    /// How often the source was gone and came back. Numbers of before and after do not belong together.
+    /// Number of times that the source was lost and came back. Numbers from before and after are not comparable.
     pub outages: u64,
-    /// Outages after which the device's clock does not show that it had power all the time: its counters may have begun
-    /// anew.
+    /// Outages after which the device's clock does not prove that it kept its power: its counters may have
+    /// restarted.
     pub resets: u64,
 }
 
-/// What comes of waiting for the next picture.
+/// Result of waiting for the next picture.
 #[derive(Debug)]
 pub enum Event {
-    /// It is here.
+    /// A picture arrived.
     Picture(Box<Picture>),
-    /// The device sent it, and not all of it came: it is no picture.
+    /// The device sent a picture that did not arrive completely; it is not used.
     Incomplete {
-        /// The device's number of it.
+        /// The device's number of the picture.
         id: u64,
         /// What is missing, in words.
         why: String,
     },
-    /// The time is over, nothing came.
+    /// The time has passed and nothing arrived.
     Quiet,
-    /// The device is gone: cable, power, process. [`PictureSource::reopen`] may bring it back.
+    /// The device is lost: cable, power, process. [`PictureSource::reopen`] may bring it back.
     Lost(Fault),
-    /// No picture will come any more: the file is played, the pipe was closed.
+    /// No more pictures will come: the file was played to its end, or the pipe was closed.
     Ended,
 }
 
-/// A source of pictures. It starts when it is opened, and is asked on one thread; pictures come at its own pace and
-/// in its own order, and are lost where nobody asks in time (which their ids show).
+/// A source of pictures. It starts when it is opened, and is polled on one thread. Pictures come at the source's own
+/// pace and in its order. They are lost if nobody polls in time, which their ids show.
 pub trait PictureSource: Send {
     /// Size and depth of all its pictures.
     fn format(&self) -> Format;
 
-    /// How its pictures are read from the sensor; none where it does not know.
+    /// How its pictures are read from the sensor; none if unknown.
     fn readout(&self) -> Option<Readout> {
         None
     }
 
-    /// The next picture, waited for at most this long.
+    /// The next picture, waiting for at most `within`.
     fn next(&mut self, within: Duration) -> Event;
 
-    /// Takes one picture now; it comes as the others do. False where the source runs by itself and cannot be asked.
+    /// Triggers one picture now; it is delivered like the others. False if the source runs by itself and cannot be
+    /// triggered.
     ///
     /// # Errors
     /// The device does not answer.
@@ -87,18 +88,19 @@ pub trait PictureSource: Send {
         Ok(false)
     }
 
-    /// How many pictures the device says it has sent since it was opened; none where it does not say: then the ids
-    /// tell.
+    /// Number of pictures that the device reports to have sent since it was opened; none if it does not report it:
+    /// then the ids are used.
     fn sent(&self) -> Option<u64> {
         None
     }
 
-    /// Packets that were asked for again and came.
+    /// Number of packets that were requested again and received.
     fn resent(&self) -> u64 {
         0
     }
 
-    /// Reads the device's clock. `None`: it has none that can be asked; its pictures' own times are all there is.
+    /// Reads the device's clock. `None`: it has no clock that can be read; only its pictures' own times are
+    /// available.
     ///
     /// # Errors
     /// The device does not answer.
@@ -106,25 +108,25 @@ pub trait PictureSource: Send {
         Ok(None)
     }
 
-    /// Whether its pictures wait where nobody asks for them (a pipe, a file): then nobody has to drop any.
+    /// Whether its pictures wait until they are requested (a pipe, a file), so that none has to be dropped.
     fn waits(&self) -> bool {
         false
     }
 
-    /// Whether [`PictureSource::reopen`] can bring it back at all.
+    /// Whether [`PictureSource::reopen`] can work at all.
     fn reopens(&self) -> bool {
         false
     }
 
-    /// Opens it again after [`Event::Lost`]; its numbers and its clock may begin anew.
+    /// Opens it again after [`Event::Lost`]; its numbers and its clock may restart.
     ///
     /// # Errors
-    /// It is not there (yet).
+    /// The device is not there (yet).
     fn reopen(&mut self) -> Result<()> {
         Err(Fault::input("this source cannot be opened again").next("start it again, then this command"))
     }
 
-    /// What can be set, by the standard names; empty where nothing can.
+    /// Features that can be set, by the standard names; empty if there are none.
     ///
     /// # Errors
     /// The device does not answer.
@@ -143,10 +145,10 @@ pub trait PictureSource: Send {
             .next("set it in the program that fills it"))
     }
 
-    /// In messages: what it is and where.
+    /// Kind and place of the source, for messages.
     fn name(&self) -> String;
 
-    /// Which device it is, however it was named: of a camera on a network its serial number.
+    /// Identity of the device, however it was named: for a network camera its serial number.
     fn device(&self) -> String {
         self.name()
     }

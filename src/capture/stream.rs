@@ -1,5 +1,5 @@
-//! In: a feed, a way to pair. Out: shots in order, each with where things stood; what was left out, listed; the
-//! account.
+//! In: a feed, a way to pair. Out: shots in order, each with the position of what moves; a list of excluded
+//! pictures; the account.
 //! Frame and unit: as [`super::pair`].
 
 use super::account::Account;
@@ -9,20 +9,20 @@ use super::pair::{LeftOut, Paired, Pairer, PoseFeed, Way};
 use crate::fault::Fault;
 use std::time::{Duration, Instant};
 
-/// What comes of waiting for a shot.
+/// Result of waiting for a shot.
 #[derive(Debug)]
 pub enum Streamed {
-    /// The next one. What becomes of it has to be noted with [`Stream::fate`].
+    /// The next shot. What becomes of it must be reported with [`Stream::fate`].
     Shot(Box<Paired>),
-    /// The time is over, nothing came.
+    /// The time has passed and nothing arrived.
     Quiet,
-    /// Nothing will come any more, and why where it is nobody's wish.
+    /// Nothing will arrive any more; with the reason, unless the end was requested.
     Ended(Option<Fault>),
 }
 
-/// Excluded pictures that are kept by name; of more only the number is.
+/// Most excluded pictures that are listed individually; further ones are only counted.
 const LISTED: usize = 10_000;
-/// How long is slept where pictures wait for a pose.
+/// Sleep interval while pictures wait for a pose.
 const GLANCE: Duration = Duration::from_millis(4);
 
 /// Pictures paired with what moves.
@@ -44,17 +44,17 @@ impl Stream {
         self.feed.format()
     }
 
-    /// What all pictures are, and how they are read from the sensor.
+    /// Format of all pictures, and how they are read from the sensor.
     pub fn pictures(&self) -> Pictures {
         self.feed.pictures()
     }
 
-    /// The source and what is known of it.
+    /// The source, with what is known about it.
     pub fn feed(&self) -> &Feed {
         &self.feed
     }
 
-    /// Pictures that were left out because nobody knows where things stood, with the reason.
+    /// Pictures that were excluded because their position is unknown, with the reason.
     pub fn left_out(&self) -> &[LeftOut] {
         &self.left_out
     }
@@ -69,13 +69,13 @@ impl Stream {
         self.feed.account()
     }
 
-    /// What happened since it was asked last.
+    /// Messages since the last call.
     pub fn news(&mut self) -> Vec<String> {
         let poses = self.pairer.poses().map(PoseFeed::news).unwrap_or_default();
         self.feed.news().into_iter().chain(poses).chain(self.pairer.news()).collect()
     }
 
-    /// The next shot, waited for at most this long.
+    /// The next shot, waiting for at most `within`.
     pub fn next(&mut self, within: Duration) -> Streamed {
         let until = Instant::now() + within;
         loop {
@@ -102,7 +102,7 @@ impl Stream {
             if left.is_zero() {
                 return Streamed::Quiet;
             }
-            // While a pose is waited for it may come before the next picture does.
+            // An awaited pose may arrive before the next picture does.
             let wait = if self.pairer.waiting() > 0 { left.min(GLANCE) } else { left };
             match self.feed.next(wait) {
                 Fed::Picture(picture, numbering) => self.pairer.push(picture, numbering),
@@ -112,7 +112,7 @@ impl Stream {
         }
     }
 
-    /// The last pictures wait a little for the pose after them.
+    /// The last pictures wait a short time for the pose after them.
     fn ending(&mut self, fault: Option<Fault>) {
         let until = Instant::now() + Duration::from_millis(300);
         while self.pairer.waiting() > 0 && self.pairer.poses().is_some() && Instant::now() < until {

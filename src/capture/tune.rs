@@ -1,5 +1,5 @@
-//! In: a camera whose pictures show a stripe. Out: pictures that were exposed after a moment; the exposure that suits
-//! the stripe.
+//! In: a camera whose pictures show a stripe. Out: pictures that were exposed after a given moment; the exposure
+//! that suits the stripe.
 //! Frame and unit: exposure in us; shares of full scale; the device's time in ns.
 
 use super::feature::{Range, Value};
@@ -9,21 +9,21 @@ use crate::fault::{Fault, Result};
 use crate::raster::Image;
 use std::time::{Duration, Instant};
 
-/// A sensor that is read while it is exposed takes up a setting a picture later.
+/// A sensor that is read while it exposes applies a setting one picture later.
 const PIPELINE: usize = 1;
-/// The same where nobody says when a picture was exposed, after those that waited already.
+/// The same number for pictures without exposure times, counted after those already waiting.
 const UNDATED: usize = 2;
-/// More pictures than any camera's driver keeps waiting.
+/// More pictures than any camera's driver buffers.
 const WAITING: usize = 256;
-/// A picture's time and its camera's clock that are farther apart, ns, are not of one clock.
+/// A picture's time and the camera's clock that are farther apart than this, ns, are not of the same clock.
 const ONE_CLOCK: u64 = 60_000_000_000;
-/// An exposure of seconds, and cameras that begin slowly.
+/// Allows for an exposure of seconds, and for cameras that start slowly.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Pictures that were exposed after a moment, however long others were under way.
+/// Pictures that were exposed after a given moment, however many older ones are in flight.
 struct Fresh<'a> {
     source: &'a mut dyn PictureSource,
-    /// That moment by the device's own clock, where it has one.
+    /// That moment by the device's own clock, if it has one.
     since: Option<u64>,
     skip: usize,
     patience: Duration,
@@ -47,7 +47,7 @@ impl<'a> Fresh<'a> {
     fn next(&mut self) -> Result<Image> {
         let until = Instant::now() + self.patience;
         if self.source.trigger()? {
-            // It takes no picture but the one that is asked for.
+            // A triggered camera takes only the picture that is requested.
             (self.since, self.skip) = (None, 0);
         }
         while Instant::now() < until {
@@ -66,44 +66,45 @@ impl<'a> Fresh<'a> {
     }
 }
 
-/// The next picture that was taken after now.
+/// The next picture that is exposed after this call.
 ///
 /// # Errors
-/// None comes within `patience`; the camera is gone.
+/// None arrives within `patience`; the camera is lost.
 pub fn fresh(source: &mut dyn PictureSource, patience: Duration) -> Result<Image> {
     Fresh::now(source, patience).next()
 }
 
-/// What tuning came to.
+/// Result of tuning.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Tuned {
-    /// us.
+    /// Exposure, us.
     pub exposure_us: f64,
-    /// What pictures look like at it.
+    /// What pictures look like with it.
     pub look: Look,
-    /// Where no exposure is right: why this one is the best.
+    /// If no exposure is right: the reason why this one is the best.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
 }
 
 const TRIES: usize = 20;
-/// Peaks that are needed to tell a share of half a hundredth, and pictures that they are gathered from at most.
+/// Number of peaks needed to measure a share of 0.5 %.
 const PEAKS: usize = 1000;
 const PICTURES: usize = 8;
-/// Too dark and too bright so near each other: nothing between them is right.
+/// If the exposure that is too bright is at most this factor above the one that is too dark, nothing between them is
+/// right.
 const NARROW: f64 = 1.04;
-/// Steps of as much that it goes down at the end.
+/// Number of final downward steps, each by the factor `NARROW`.
 const STEPS_DOWN: usize = 5;
-/// Peaks below half of full scale are too dark for the sake of a few glints.
+/// If peaks must stay below this share of full scale because of a few glints, they are too dark.
 const DIMMEST: f64 = 0.5;
-/// Where saturation is the limit, peaks are to stand just inside their range.
+/// If saturation is the limit, peaks are aimed just inside the wanted range.
 const CAREFUL: f64 = WANTED[0] + 0.02;
 
 /// Finds the exposure at which the stripe's peak is right, and leaves it set.
 ///
 /// # Errors
-/// A source without ExposureTime; no stripe at any exposure; a stripe too bright or too dark at the ends of its
-/// range; one whose glints saturate while the rest is dark.
+/// A source without ExposureTime; no stripe at any exposure; a stripe too bright or too dark at the ends of the
+/// range; a stripe whose glints saturate while the rest is dark.
 pub fn tune(source: &mut dyn PictureSource, mut tried: impl FnMut(f64, &Look)) -> Result<Tuned> {
     let (name, [low, high], mut exposure_us) = exposure(source)?;
     let mut bounds = Bounds::default();
@@ -134,14 +135,14 @@ fn changes(what: String) -> Fault {
         .next("hold everything still and tune again")
 }
 
-/// What tuning says of a source whose exposure cannot be set.
+/// The fault for a source whose exposure cannot be set.
 pub fn unexposed(name: &str) -> Fault {
     Fault::usage(format!("{name}: has no ExposureTime to set"))
         .cause("a pipe, a folder, a file, or a camera whose exposure is set elsewhere")
         .next("set the exposure there; sheetlight camera snap reports the stripe")
 }
 
-/// The feature's name, its range, its value.
+/// The feature's name, its range and its value.
 fn exposure(source: &mut dyn PictureSource) -> Result<(String, [f64; 2], f64)> {
     let features = source.features()?;
     let names = ["ExposureTime", "ExposureTimeAbs"];
@@ -156,7 +157,8 @@ fn exposure(source: &mut dyn PictureSource) -> Result<(String, [f64; 2], f64)> {
     Ok((feature.name.clone(), range, value))
 }
 
-/// What pictures of now look like: where they may be right, of as many as a few per mille are told from.
+/// Assesses present pictures: near a right exposure it uses as many as are needed to measure shares of a few per
+/// mille.
 fn judged(source: &mut dyn PictureSource) -> Result<Look> {
     let mut fresh = Fresh::now(source, PATIENCE);
     let mut images = vec![fresh.next()?];
@@ -172,9 +174,9 @@ fn judged(source: &mut dyn PictureSource) -> Result<Look> {
     Ok(look_at(&images))
 }
 
-/// Neither side is right: the brightest exposure that saturates nothing. Which of two so near each other shows five
-/// of a thousand peaks saturated and which shows six is chance: it goes down by small steps before the light is said
-/// to change.
+/// Used if neither side is right: finds the brightest exposure that saturates nothing. Between exposures so close
+/// together, whether five or six of a thousand peaks saturate is chance. So it goes down in small steps before it
+/// concludes that the light changes.
 fn settle(
     source: &mut dyn PictureSource,
     name: &str,
@@ -197,7 +199,7 @@ fn settle(
     Err(changes(format!("at {:.0} us, where it was too dark before, {seen}", dark * NARROW)))
 }
 
-/// What is said of an exposure that is the best there is.
+/// The result for an exposure that is the best possible.
 fn settled(dark: f64, bright: f64, seen: Look) -> Result<Tuned> {
     let Some(peak) = seen.stripe.as_ref().map(|s| s.peak) else {
         return Err(Fault::refused(format!("no stripe at {dark:.0} us, and at {bright:.0} us too much light; {seen}"))
@@ -218,7 +220,7 @@ fn settled(dark: f64, bright: f64, seen: Look) -> Result<Tuned> {
     Ok(Tuned { exposure_us: dark, look: seen, remark: Some(said) })
 }
 
-/// The longest exposure that was too dark, the shortest that was too bright.
+/// The longest exposure that was too dark and the shortest that was too bright, us.
 #[derive(Default)]
 struct Bounds {
     dark: Option<f64>,
@@ -226,7 +228,7 @@ struct Bounds {
 }
 
 impl Bounds {
-    /// What to try after an exposure that is not right; none where nothing between the two sides can be.
+    /// The exposure to try after one that is not right; none if nothing between the two bounds can be right.
     fn next(&mut self, exposure_us: f64, seen: &Look) -> Option<f64> {
         let factor = factor(seen);
         if factor < 1.0 {
@@ -237,7 +239,7 @@ impl Bounds {
         let aim = exposure_us * factor;
         let (Some(dark), Some(bright)) = (self.dark, self.bright) else { return Some(aim) };
         if dark >= bright {
-            // The light changed: what was known of the other side is not true any more.
+            // The light changed: the other bound is no longer valid.
             *self = Bounds::default();
             return Some(aim);
         }
@@ -246,11 +248,11 @@ impl Bounds {
     }
 }
 
-/// By how much an exposure that is not right is to be multiplied.
+/// Factor by which an exposure that is not right is to be multiplied.
 fn factor(seen: &Look) -> f64 {
     let middle = 0.5 * (WANTED[0] + WANTED[1]);
     match &seen.stripe {
-        // Nothing is known of what lies above full scale.
+        // The level of saturated peaks above full scale is unknown.
         Some(s) if s.saturated > 0.2 => 0.4,
         Some(s) if s.saturated > MOST_SATURATED => {
             if 0.95 * s.peak > CAREFUL {
@@ -272,9 +274,9 @@ mod tests {
     use crate::capture::{Format, Picture, RoundTrip};
     use std::collections::VecDeque;
 
-    /// Pictures of 100x80 at 50 a second by its own clock; `waiting` of them are always under way, so that those that
-    /// come after a setting were exposed long before it. One line of `glint` shines `glints` times as bright, in each
-    /// picture by up to a share of `flicker` more or less: what counting noise does to it.
+    /// Pictures of 100x80 at 50 a second by the camera's own clock. `waiting` of them are always in flight, so that
+    /// those that arrive after a setting were exposed long before it. One line in `glint` is `glints` times as
+    /// bright. In each picture that factor varies by up to a share of `flicker`, like counting noise.
     struct Late {
         exposure_us: f64,
         ns: u64,
@@ -348,7 +350,7 @@ mod tests {
             Ok(vec![Feature { name: "ExposureTime".into(), value, unit: "us".into(), range, writable: true }])
         }
         fn set(&mut self, _: &str, value: &str) -> Result<()> {
-            // What is under way was exposed before.
+            // Pictures in flight were exposed before the setting.
             self.fill(6);
             self.exposure_us = value.parse().expect("a number");
             self.set.push(self.exposure_us);
@@ -367,7 +369,7 @@ mod tests {
                 let tuned = tune(&mut camera, |_, _| {}).unwrap();
                 let peak = (2.0 + 0.1 * tuned.exposure_us) / 255.0;
                 assert!((WANTED[0]..=WANTED[1]).contains(&peak) && tuned.remark.is_none(), "{tuned:?}");
-                // Each step is one that its own pictures ask for: at 0.1 levels a us, none is taken twice.
+                // Each step follows from its own pictures: at 0.1 levels per us none is tried twice.
                 assert!(camera.set.len() <= 9, "dated {dated}: {:?}", camera.set);
                 assert!(camera.set.is_sorted() == (from < 100.0), "it turned back: {:?}", camera.set);
             }
@@ -376,15 +378,15 @@ mod tests {
 
     #[test]
     fn where_a_few_glints_saturate_it_settles_on_what_is_best_or_says_so() {
-        // One line in fifty shines: two peaks in a hundred are saturated before the others are half as bright.
+        // One line in fifty is glossy: 2 % of the peaks are saturated before the others are half as bright.
         let fault = tune(&mut Late::new(1000.0, true, 50), |_, _| {}).unwrap_err();
         assert!(fault.what.contains("are saturated") && fault.next.contains("camera set ExposureTime"), "{fault}");
-        // As bright again as the others: these are at 60 % where it saturates.
+        // These are 1.6 times as bright as the others, which are at 60 % when these saturate.
         let tuned = tune(&mut Late { glints: 1.6, ..Late::new(1000.0, true, 50) }, |_, _| {}).unwrap();
         let stripe = tuned.look.stripe.as_ref().unwrap();
         assert!((0.58..0.66).contains(&stripe.peak) && stripe.saturated <= MOST_SATURATED, "{tuned:?}");
         assert!(tuned.remark.is_some_and(|said| said.contains("are saturated")));
-        // Which pictures show one glint more is chance; that is no light that changes.
+        // Which pictures show one glint more is chance, not a change of light.
         for begun in 0..40 {
             let late = Late::new(200.0 + 60.0 * begun as f64, true, 50);
             let mut camera = Late { glints: 1.6, flicker: 0.2, ns: 7_000_000_000 + 20_000_000 * begun, ..late };
@@ -392,7 +394,7 @@ mod tests {
             let stripe = tuned.look.stripe.as_ref().unwrap();
             assert!((0.5..0.72).contains(&stripe.peak) && stripe.saturated <= MOST_SATURATED, "{tuned:?}");
         }
-        // No laser, room light.
+        // Laser off, room light only.
         let fault = tune(&mut Late { glints: 0.0, ..Late::new(1000.0, true, 1) }, |_, _| {}).unwrap_err();
         assert!(fault.what.contains("no stripe"), "{fault}");
     }

@@ -1,4 +1,4 @@
-//! In: the word that names a source of pictures. Out: what it means, and the source, opened.
+//! In: a word that names a source of pictures. Out: its meaning, and the opened source.
 //! Frame and unit: none.
 
 use super::format::RawFormat;
@@ -14,16 +14,16 @@ use crate::geometry::AxisKind;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// A source of pictures by its name on the command line.
+/// A source of pictures, as named on the command line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CameraUri {
-    /// `-`: raw frames on standard input; their format is stated beside it.
+    /// `-`: raw frames on standard input; a separate option states their format.
     Input,
     /// `cell://HOST:PORT?rate=FPS`: a cell's camera.
     Cell {
         /// `HOST:PORT`
         address: String,
-        /// Pictures a second; 0: as the cell likes, negative: one by one.
+        /// Pictures a second; 0: the cell chooses, negative: on request only.
         rate_hz: f64,
     },
     /// `gige://SERIAL`, `gige://IP` or `gige://first`, `?packet=1500`: a GigE Vision camera.
@@ -31,39 +31,39 @@ pub enum CameraUri {
     Gige {
         /// Serial number, address, name, or `first`.
         word: String,
-        /// Bytes of a packet; none: as large as the network carries.
+        /// Packet size in bytes; none: as large as the network carries.
         packet: Option<u32>,
     },
     /// `ffmpeg:ARGUMENTS?bits=8`: what ffmpeg opens with these arguments.
     Ffmpeg {
-        /// In ffmpeg's words, parted by blanks.
+        /// Arguments of ffmpeg, separated by blanks.
         arguments: Vec<String>,
-        /// Depth that is asked for.
+        /// Requested depth, bits.
         bits: u8,
     },
     /// `folder:PATH?bits=8&wait=60`: a folder that another program fills.
     Folder {
         /// The folder.
         path: PathBuf,
-        /// The sensor's depth, of 16-bit files.
+        /// The sensor's depth for 16-bit files.
         bits: u8,
-        /// How long the first picture is waited for, s.
+        /// Time to wait for the first picture, s.
         wait_s: f64,
     },
-    /// `play:RECORDING?rate=FPS&loops=N`: a recording, as if it were taken now.
+    /// `play:RECORDING?rate=FPS&loops=N`: a recording, played as if taken now.
     Play {
         /// The recording.
         path: PathBuf,
-        /// Pictures a second; 0: as fast as they are asked for.
+        /// Pictures a second; 0: as fast as they are requested.
         rate_hz: f64,
-        /// How often.
+        /// Number of repetitions.
         loops: u64,
     },
     /// `sim:SEED?rate=FPS&speed=MM_S&...`: a simulated station that moves.
     Sim(SimSpec),
 }
 
-/// What can be written, for messages.
+/// Known sources, for messages.
 const KNOWN: &str =
     "gige://first, cell://HOST:PORT, ffmpeg:ARGUMENTS, folder:PATH, play:RECORDING, sim:SEED, - (with --raw)";
 
@@ -76,7 +76,7 @@ impl std::str::FromStr for CameraUri {
             return Ok(CameraUri::Input);
         }
         let (kind, rest) = s.split_once(':').ok_or_else(|| format!("'{s}' names no camera; known are {KNOWN}"))?;
-        // Of an ffmpeg address the last question mark that has `bits=` after it is ours.
+        // In an ffmpeg address, options of ours begin at the last question mark followed by `bits=`.
         let ours = if kind == "ffmpeg" { rest.rfind("?bits=") } else { rest.find('?') };
         let (place, query) = ours.map_or((rest, ""), |at| (&rest[..at], &rest[at + 1..]));
         match kind {
@@ -164,7 +164,7 @@ fn sim(seed: &str, query: &str) -> Said<SimSpec> {
     })
 }
 
-/// The values of `KEY=VALUE&KEY=VALUE`, in the order of the keys; another key is refused.
+/// The values of `KEY=VALUE&KEY=VALUE`, in the order of the keys; unknown keys are refused.
 fn options<'a, const N: usize>(query: &'a str, keys: [&str; N]) -> Said<[Option<&'a str>; N]> {
     let mut out = [None; N];
     for pair in query.split('&').filter(|p| !p.is_empty()) {
@@ -191,7 +191,7 @@ fn depth(text: Option<&str>) -> Said<u8> {
 }
 
 impl CameraUri {
-    /// Opens the source; pictures come from now on. `raw` states what frames on a pipe are like.
+    /// Opens the source; it delivers pictures from then on. `raw` states the format of frames on a pipe.
     ///
     /// # Errors
     /// Nothing is there, it is in use, or it needs `raw`.

@@ -1,39 +1,39 @@
-//! In: messages of a cell's camera, or the bytes of a stream of them. Out: the other one. Pure: nothing here waits or
-//! allocates by what a length claims.
+//! In: messages of a cell's camera, or the bytes of a stream of them. Out: the other form. Pure functions: nothing
+//! here waits, or allocates as much as an unchecked length claims.
 //! Frame and unit: little endian; times in ns of the cell's clock.
 //!
-//! The server (the cell) sends messages, the client (we) lines of text. A message is a head of 16 bytes and its
-//! content:
+//! The server (the cell) sends messages, the client (this program) lines of text. A message consists of a head of 16
+//! bytes and its content:
 //!
 //! | bytes | what |
 //! |---|---|
 //! | 4 | `SLP1` for a picture, `SLT1` for text |
 //! | 4 | 0 |
-//! | 8 | length of the content |
+//! | 8 | length of the content, bytes |
 //!
 //! A picture's content is a head of 56 bytes, then its rows without gaps (levels of more than 8 bits as two bytes):
 //!
 //! | bytes | what |
 //! |---|---|
 //! | 4, 4, 4 | width, height, bits |
-//! | 4 | flags: 1 = the count is one |
-//! | 8 | id: one more for every picture taken, sent or not |
-//! | 8 | when its exposure began |
-//! | 8 | how long it was exposed |
+//! | 4 | flags: 1 = the count is valid |
+//! | 8 | id: increases by one for every picture taken, sent or not |
+//! | 8 | start of the exposure, ns |
+//! | 8 | exposure time, ns |
 //! | 8 | an encoder's or trigger's count (signed) |
-//! | 8 | pictures that this camera has sent to this client, this one counted |
+//! | 8 | number of pictures that this camera has sent to this client, including this one |
 //!
-//! Lines, each answered by one text in order, which begins with `ok` or `error `:
+//! Lines; each is answered in order by one text that begins with `ok` or `error `:
 //!
 //! | line | answer |
 //! |---|---|
-//! | `start FPS` | pictures come at this rate until `stop`; 0: as the cell likes |
-//! | `stop` | no picture comes any more |
+//! | `start FPS` | pictures come at this rate until `stop`; 0: the cell chooses the rate |
+//! | `stop` | no more pictures come |
 //! | `snap` | one picture, taken now |
 //! | `time` | `ok NS`: the cell's clock |
-//! | `format` | `ok WIDTH HEIGHT BITS`: of its pictures, which show the whole sensor |
-//! | `features` | `ok`, then a line each: name, value, unit, low, high, parted by tabs |
-//! | `set NAME VALUE` | `ok`; what is set stays so for whoever connects next, as in a camera |
+//! | `format` | `ok WIDTH HEIGHT BITS` of its pictures, which show the whole sensor |
+//! | `features` | `ok`, then a line each: name, value, unit, low, high, separated by tabs |
+//! | `set NAME VALUE` | `ok`; the setting stays for later clients, as in a camera |
 
 use super::format::Format;
 use crate::fault::{Fault, Result};
@@ -48,7 +48,7 @@ pub const MOST_TEXT: u64 = 1 << 20;
 const PICTURE: [u8; 4] = *b"SLP1";
 const TEXT: [u8; 4] = *b"SLT1";
 
-/// What a server sends.
+/// A message from the server.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Message {
     /// A picture with its numbers.
@@ -62,23 +62,23 @@ pub enum Message {
 pub struct Sent {
     /// Grey levels of the sensor's depth.
     pub image: Image,
-    /// One more for every picture taken, sent or not.
+    /// Increases by one for every picture taken, sent or not.
     pub id: u64,
-    /// When its exposure began, by the cell's clock.
+    /// Start of the exposure, by the cell's clock.
     pub device_ns: u64,
-    /// How long it was exposed.
+    /// Exposure time.
     pub exposure_ns: u64,
     /// An encoder's or trigger's count.
     pub count: Option<i64>,
-    /// Pictures sent to this client so far, this one counted.
+    /// Pictures sent to this client so far, including this one.
     pub sent: u64,
 }
 
-/// What a message's head says: which content, and how long it is.
+/// Content of a message's head: kind and length of what follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Head {
     picture: bool,
-    /// Bytes that follow.
+    /// Number of bytes that follow.
     pub length: usize,
 }
 
@@ -96,7 +96,7 @@ fn head(kind: [u8; 4], length: usize) -> Vec<u8> {
     out
 }
 
-/// A message's bytes.
+/// Serialises a message.
 pub fn write(message: &Message) -> Vec<u8> {
     match message {
         Message::Text(text) => {
@@ -118,7 +118,7 @@ pub fn write(message: &Message) -> Vec<u8> {
     }
 }
 
-/// Reads a message's first [`HEAD`] bytes. Refused: another kind, a content longer than any picture or text.
+/// Reads a message's first [`HEAD`] bytes. Refuses an unknown kind, and a content longer than any picture or text.
 pub fn read_head(bytes: &[u8; HEAD]) -> Result<Head> {
     let picture = bytes[..4] == PICTURE;
     if !picture && bytes[..4] != TEXT {
@@ -132,7 +132,8 @@ pub fn read_head(bytes: &[u8; HEAD]) -> Result<Head> {
     Ok(Head { picture, length: length as usize })
 }
 
-/// Reads the content that a head announced. Refused: a picture whose size and bytes disagree, text that is not UTF-8.
+/// Reads the content that a head announced. Refuses a picture whose size and bytes disagree, and text that is not
+/// UTF-8.
 pub fn read(head: Head, mut content: Vec<u8>) -> Result<Message> {
     if content.len() != head.length {
         return Err(bad(format!("{} bytes where {} were announced", content.len(), head.length)));
@@ -180,7 +181,7 @@ mod tests {
         }
         let whole = write(&eight);
         for at in 0..whole.len() {
-            // No byte makes it panic; the lengths are believed only as far as they agree.
+            // No byte causes a panic; lengths are trusted only as far as they are consistent.
             for value in [0, 1, 0x7f, 0xff] {
                 let mut changed = whole.clone();
                 changed[at] = value;

@@ -1,6 +1,6 @@
 //! In: the `board` entries of meta.json and board description files. Out: the board's layout.
-//! Frame and unit: board frame, mm. Chessboard: origin in the first inner corner, x along the
-//! columns, y along the rows, z into the board. ChArUco: origin in the outer corner of the first square.
+//! Frame and unit: board frame, mm. Chessboard: origin in the first inner corner, x along the columns, y along the
+//! rows, z into the board. ChArUco: origin in the outer corner of the first square.
 
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec3;
@@ -36,22 +36,22 @@ pub enum BoardSpec {
         /// Id of the first marker; the others follow row by row.
         #[serde(default, skip_serializing_if = "is_zero")]
         first_id: u32,
-        /// Colour of the square at the origin. Unstated: the markers' ids tell it in each picture. OpenCV draws
-        /// "black" since 4.6; before, and as its "legacy pattern", boards with an even number of rows begin with
-        /// "white".
+        /// Colour of the square at the origin. If it is not stated, the markers' ids determine it in each picture.
+        /// OpenCV draws "black" since 4.6. Earlier versions, and its "legacy pattern", draw boards with an even
+        /// number of rows with "white" first.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         first_square: Option<String>,
         /// Plain margin around the outer squares, mm, 0..=10000; 0 unless stated.
         #[serde(default)]
         border_mm: f64,
     },
-    /// ArUco or AprilTag markers in rows, one or more, white between them.
+    /// ArUco or AprilTag markers in rows, one or more, with white between them.
     MarkerGrid {
         /// Markers [columns, rows]; [1, 1] for a single one.
         markers: [u32; 2],
         /// Side of a marker, its black ring included, mm; above 0, up to 10000.
         marker_mm: f64,
-        /// White between two markers; not needed for a single one.
+        /// White gap between two markers, mm; not needed for a single one.
         #[serde(default)]
         gap_mm: f64,
         /// OpenCV's name, e.g. DICT_APRILTAG_36h11.
@@ -67,15 +67,16 @@ pub enum BoardSpec {
     Circles {
         /// Dots [columns, rows], 2..=1000 each.
         dots: [u32; 2],
-        /// Between two rows, and between the dots of a row (twice as far in an asymmetric grid), mm.
+        /// Distance between two rows, and between the dots of a row (doubled in an asymmetric grid), mm.
         pitch_mm: f64,
-        /// Unstated: it is measured in each picture.
+        /// Diameter of a dot, mm; measured in each picture if not stated.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         diameter_mm: Option<f64>,
         /// OpenCV's layout: odd rows are shifted by `pitch_mm`.
         #[serde(default)]
         asymmetric: bool,
-        /// Plain margin around the outer dots, or their centres where no diameter is stated, mm, 0..=10000; or 0.
+        /// Plain margin around the outer dots, mm, 0..=10000; 0 unless stated. It is counted from the dots' centres
+        /// if no diameter is stated.
         #[serde(default)]
         border_mm: f64,
     },
@@ -102,7 +103,7 @@ impl BoardSpec {
         Ok(board)
     }
 
-    /// Refuses a board that cannot be.
+    /// Refuses an impossible board.
     pub(super) fn check(&self) -> Result<()> {
         let (count, what, least, border) = match self {
             BoardSpec::Chessboard { inner_corners, border_mm, .. } => (inner_corners, "inner corners", 2, border_mm),
@@ -119,7 +120,7 @@ impl BoardSpec {
             return refuse(format!("the board has {n} {what} along a side, {least} to 1000 are allowed"));
         }
         let in_range = |v: f64| v > 0.0 && v <= 10_000.0;
-        // What is drawn in the cells must fit into them.
+        // What is printed in a cell must fit into it.
         let (cell, drawn) = match self {
             BoardSpec::Chessboard { square_mm, .. } => (*square_mm, None),
             BoardSpec::Charuco { square_mm, marker_mm, .. } => (*square_mm, Some(("marker_mm", *marker_mm))),
@@ -137,7 +138,7 @@ impl BoardSpec {
             return refuse(format!("the board's border_mm is {border}, 0 to 10000 mm is allowed"));
         }
         match self {
-            // Without white between them two markers are one patch.
+            // Without a white gap two markers merge into one patch.
             BoardSpec::MarkerGrid { markers, marker_mm, gap_mm, .. }
                 if !(0.0..=10_000.0).contains(gap_mm) || (markers != &[1, 1] && *gap_mm < 0.1 * marker_mm) =>
             {
@@ -154,14 +155,15 @@ impl BoardSpec {
         }
     }
 
-    /// Whether the square at a ChArUco board's origin is white, and so holds a marker. A board that leaves its first
-    /// square open is drawn with a black one.
+    /// Whether the square at a ChArUco board's origin is white, and so contains a marker. A board that does not
+    /// state its first square is drawn with a black one.
     pub fn begins_white(&self) -> bool {
         matches!(self, BoardSpec::Charuco { first_square: Some(colour), .. } if colour == "white")
     }
 
-    /// A picture of part of this ChArUco board may not tell the colour of its first square, which the description
-    /// leaves open: with odd columns and even rows one order of markers is the other, shifted by a column.
+    /// Whether a picture of part of this ChArUco board may leave the colour of its first square undetermined if the
+    /// description does not state it. With odd columns and even rows, one order of markers equals the other shifted
+    /// by a column.
     pub fn first_square_may_stay_open(&self) -> bool {
         match self {
             BoardSpec::Charuco { squares: [columns, rows], first_square: None, .. } => {
@@ -171,8 +173,8 @@ impl BoardSpec {
         }
     }
 
-    /// A ChArUco board whose description leaves its first square open, with that square as `white` says; any other
-    /// board as it is.
+    /// A ChArUco board that does not state its first square, with that square set as `white` says; any other board
+    /// unchanged.
     pub fn beginning(&self, white: bool) -> BoardSpec {
         let mut board = self.clone();
         if let BoardSpec::Charuco { first_square: open @ None, .. } = &mut board {
@@ -181,7 +183,7 @@ impl BoardSpec {
         board
     }
 
-    /// Diameter of a circle grid's dots as they are drawn: half of the pitch unless stated, mm.
+    /// Diameter at which a circle grid's dots are drawn, mm: half of the pitch unless stated.
     pub fn drawn_diameter(&self) -> Option<f64> {
         match self {
             BoardSpec::Circles { pitch_mm, diameter_mm, .. } => Some(diameter_mm.unwrap_or(0.5 * pitch_mm)),
@@ -189,7 +191,7 @@ impl BoardSpec {
         }
     }
 
-    /// The key that states its cells' side, mm: every length on the board is in proportion to it.
+    /// The key that states the size of the board's cells, mm: every length on the board scales with it.
     pub fn length_key(&self) -> &'static str {
         match self {
             BoardSpec::Chessboard { .. } | BoardSpec::Charuco { .. } => "square_mm",
@@ -198,10 +200,10 @@ impl BoardSpec {
         }
     }
 
-    /// Positions of the features in the board frame, row by row; their index is the feature's id.
-    /// Chessboard: inner corners. ChArUco: inner corners too, with the origin one square outside
-    /// the first of them. Circles: centres; in an asymmetric grid (OpenCV's layout) columns are
-    /// two half pitches apart and odd rows are shifted by one.
+    /// Positions of the features in the board frame, row by row; a feature's index is its id.
+    /// Chessboard and ChArUco: the inner corners; a ChArUco board's origin is one square outside the first of them.
+    /// Circles: the centres. In an asymmetric grid (OpenCV's layout) columns are two half pitches apart and odd rows
+    /// are shifted by one.
     pub fn features(&self) -> Vec<Vec3> {
         match self {
             BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm, .. } => {
@@ -230,7 +232,7 @@ impl BoardSpec {
             }),
         }
     }
-    /// The outline [x low, y low, x high, y high], border included.
+    /// The outline [x low, y low, x high, y high], including the border.
     pub fn outline(&self) -> [f64; 4] {
         match self {
             BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm: s, border_mm: b, .. } => {
@@ -245,7 +247,7 @@ impl BoardSpec {
             }
             BoardSpec::Circles { dots: [nx, ny], pitch_mm: p, diameter_mm: d, asymmetric, border_mm: b } => {
                 let columns = if *asymmetric { f64::from(2 * nx - 1) } else { f64::from(nx - 1) };
-                // What is not known to be there is not counted as board.
+                // An area that is not known to be printed does not count as board.
                 let r = d.unwrap_or(0.0) / 2.0 + b;
                 [-r, -r, columns * p + r, f64::from(ny - 1) * p + r]
             }

@@ -1,6 +1,5 @@
-//! In: a file of board poses that another program measured. Out: each with the number of the robot pose it was
-//! taken at.
-//! Frame and unit: camera_from_board; the file states or names its units, the result is mm.
+//! In: a file of board poses that another program measured. Out: each pose with the number of its robot pose.
+//! Frame and unit: camera_from_board; the file states its units, the result is in mm.
 
 use super::pose_csv;
 use super::poses::json_rows;
@@ -8,14 +7,14 @@ use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Rigid};
 use std::path::Path;
 
-/// What a CSV must say of its poses, and JSON under `transform`.
+/// The transform that a CSV file must name, and that JSON must state under `transform`.
 const TRANSFORM: &str = "camera_T_board";
 
-/// Loads board poses: the layouts of robot poses ([`super::load_poses`]), but numbers may be left out where the
-/// board was not found.
+/// Loads board poses. The layouts are those of robot poses ([`super::load_poses`]), but numbers may be missing where
+/// the board was not found.
 ///
 /// # Errors
-/// Another transform than camera_T_board, or none stated; a number twice; a board behind the camera.
+/// Another transform than camera_T_board, or none stated; a repeated number; a board behind the camera.
 pub fn load_board_poses(path: &Path) -> Result<Vec<(usize, Rigid<Camera, Board>)>> {
     let text = crate::files::read_text(path)?;
     let json = path.extension().is_some_and(|e| e == "json");

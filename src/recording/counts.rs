@@ -1,5 +1,5 @@
-//! In: a recording of an axis: counts of its frames, of a counts file, or of trigger pulses. Out: where the axis
-//! stood at each frame; a frame whose count is not known stays without one.
+//! In: a recording of an axis: counts of its frames, of a counts file, or of trigger pulses. Out: the axis' position
+//! at each frame; a frame with an unknown count gets none.
 //! Frame and unit: counts in the unit that `motion` states, from its zero.
 
 use super::Recording;
@@ -10,8 +10,8 @@ use crate::files::{TableRow, table};
 use std::collections::BTreeSet;
 
 impl Recording {
-    /// Where the axis stood at every frame, from the motion's zero; `None` where the count is not known: nothing is
-    /// made up between two others. Refused: a robot's recording, a spoilt counts file.
+    /// The axis' position at every frame, from the motion's zero; `None` if the count is unknown: it is never
+    /// interpolated. Refuses a robot's recording and a spoilt counts file.
     pub fn counts(&self) -> Result<Vec<Option<f64>>> {
         let motion = self.meta.motion();
         if motion.axis().is_none() {
@@ -35,7 +35,7 @@ impl Recording {
     }
 }
 
-/// Rows `frame,count`; frames that are not named have no count.
+/// Reads rows `frame,count`; frames without a row have no count.
 fn from_csv(text: &str, frames: usize) -> Result<Vec<Option<f64>>> {
     let bad = |number: u64, what: String| {
         Err(Fault::input(format!("line {number}: {what}"))

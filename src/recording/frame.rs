@@ -1,4 +1,4 @@
-//! In: one entry of `frames` in meta.json. Out: which pictures were taken then, and what they belong to.
+//! In: one entry of `frames` in meta.json. Out: the pictures taken then, with their pose, board and count.
 //! Frame and unit: indices; counts in the unit of the recording's motion.
 
 use super::taken::Taken;
@@ -19,13 +19,13 @@ pub struct FrameRef {
     /// Index into `boards`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub board: Option<usize>,
-    /// Where the axis stood, in `motion.unit`.
+    /// Position of the axis, in `motion.unit`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub count: Option<f64>,
     /// Number of the pulse that triggered the camera, from 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trigger: Option<u64>,
-    /// How it came, of a recorder.
+    /// Acquisition data of the frame, written by a recorder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub taken: Option<Taken>,
 }

@@ -1,5 +1,5 @@
-//! In: a file with one frame a line, as a recorder writes it while it runs. Out: the frames; a last line that was cut
-//! off is none.
+//! In: a file with one frame a line, which a recorder appends to while it runs. Out: the frames; an incomplete last
+//! line is ignored.
 //! Frame and unit: as `frames` of meta.json.
 
 use super::frame::FrameRef;
@@ -7,10 +7,10 @@ use crate::fault::{Fault, Result};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-/// Longest line that is read, bytes; a recorder's have some hundred.
+/// Longest line that is read, bytes; a recorder's lines have some hundred.
 const LONGEST: usize = 1 << 16;
 
-/// Reads the file. Refused: a line in the middle that is no frame, a line longer than any frame's.
+/// Reads the file. Refuses a line in the middle that is not a frame, and a line longer than any frame's.
 pub(super) fn load(path: &Path) -> Result<Vec<FrameRef>> {
     crate::files::length(path)?;
     let file = std::fs::File::open(path).map_err(|e| Fault::read(path, e))?;
@@ -20,7 +20,7 @@ pub(super) fn load(path: &Path) -> Result<Vec<FrameRef>> {
         let read = std::io::Read::take(&mut reader, LONGEST as u64).read_until(b'\n', &mut line);
         read.map_err(|e| Fault::read(path, e))?;
         if line.last() != Some(&b'\n') && line.len() < LONGEST {
-            // The end, or what a recorder was writing when it was stopped.
+            // The end of the file, or the line that the recorder was writing when it was stopped.
             return Ok(frames);
         }
         let frame = serde_json::from_slice(&line).map_err(|e| {
@@ -32,7 +32,7 @@ pub(super) fn load(path: &Path) -> Result<Vec<FrameRef>> {
     }
 }
 
-/// Frames of a file that a recorder is still writing, read in order.
+/// Reads frames in order from a file that a recorder is still writing.
 pub struct FollowedFrames {
     path: PathBuf,
     reader: BufReader<std::fs::File>,
@@ -44,16 +44,16 @@ impl FollowedFrames {
     /// Opens `frames.jsonl`.
     ///
     /// # Errors
-    /// There is none.
+    /// The file does not exist.
     pub fn open(path: &Path) -> Result<FollowedFrames> {
         let file = std::fs::File::open(path).map_err(|e| Fault::read(path, e))?;
         Ok(FollowedFrames { path: path.to_owned(), reader: BufReader::new(file), next: 0, line: Vec::new() })
     }
 
-    /// Frame `index`, which the recorder has written; after the one that was asked for before.
+    /// Frame `index`, which the recorder must have written already. Indices of successive calls must ascend.
     ///
     /// # Errors
-    /// The disk does not give it back.
+    /// The file cannot be read.
     pub fn frame(&mut self, index: usize) -> Result<FrameRef> {
         while self.next <= index {
             self.line.clear();

@@ -1,12 +1,12 @@
 //! In: the description of a board with markers. Out: which cells of its markers are printed black.
-//! Frame and unit: board frame, mm; rows and columns of cells from the marker's upper left.
+//! Frame and unit: board frame, mm; rows and columns of cells counted from the marker's upper left.
 
 use super::BoardSpec;
 use crate::fault::{Fault, Result};
 use calib_targets_aruco::{Dictionary, resolve_dictionary};
 
-/// The markers of one board, in OpenCV's order: row by row over the white squares of a ChArUco board, over all
-/// places of a grid.
+/// The markers of one board, in OpenCV's order: row by row over the white squares of a ChArUco board, or over all
+/// positions of a grid.
 #[derive(Clone, Debug)]
 pub struct Markers {
     codes: Dictionary,
@@ -14,8 +14,8 @@ pub struct Markers {
     cells: [u32; 2],
     pitch_mm: f64,
     marker_mm: f64,
-    /// Only the white cells of a checker pattern hold one, in their middle: those whose column and row add up to an odd
-    /// (1) or an even (0) number. `None`: every cell.
+    /// Restricts markers to the white cells of a checker pattern: those whose column plus row is odd (1) or even
+    /// (0). There a marker is in the middle of its cell. `None`: every cell has a marker.
     white: Option<u32>,
     first_id: usize,
 }
@@ -43,7 +43,7 @@ impl Markers {
             )
         })?;
         let all = cells[0] as usize * cells[1] as usize;
-        // The colour of the first square has one square more where their number is odd.
+        // If the number of squares is odd, the colour of the first square has one square more.
         let needed = first_id
             + match white {
                 None => all,
@@ -56,11 +56,11 @@ impl Markers {
         }
         Ok(Some(Markers { codes, cells, pitch_mm, marker_mm, white, first_id }))
     }
-    /// The dictionary that its markers are from.
+    /// The dictionary of its markers.
     pub fn dictionary(&self) -> Dictionary {
         self.codes
     }
-    /// Cells across a marker, its black ring included.
+    /// Number of cells across a marker, including its black ring.
     pub fn cells(&self) -> usize {
         self.codes.marker_size() + 2
     }
@@ -68,7 +68,7 @@ impl Markers {
     pub fn cell_mm(&self) -> f64 {
         self.marker_mm / self.cells() as f64
     }
-    /// Places with a marker: column, row and the marker's id.
+    /// Positions of the markers: column, row and the marker's id.
     pub fn places(&self) -> impl Iterator<Item = (u32, u32, usize)> + use<> {
         let ([nx, ny], white, first) = (self.cells, self.white, self.first_id);
         let all = (0..ny).flat_map(move |j| (0..nx).map(move |i| (i, j)));
@@ -80,7 +80,7 @@ impl Markers {
         let rim = if self.white.is_some() { 0.5 * (self.pitch_mm - self.marker_mm) } else { 0.0 };
         [f64::from(i) * self.pitch_mm + rim, f64::from(j) * self.pitch_mm + rim]
     }
-    /// Whether a cell of marker `id` is black; codes are row by row from the lowest bit, 1 is black.
+    /// Whether a cell of marker `id` is black. A code holds the cells row by row from the lowest bit; 1 is black.
     pub fn black(&self, id: usize, column: usize, row: usize) -> bool {
         let bits = self.codes.marker_size();
         let ring = row == 0 || column == 0 || row > bits || column > bits;
@@ -101,7 +101,7 @@ impl Markers {
         let (c, r) = (((x - x0) / self.cell_mm()).floor(), ((y - y0) / self.cell_mm()).floor());
         let n = self.cells() as f64;
         let before = j * self.cells[0] + i;
-        // Of the squares before a white one every second is white.
+        // Every second square before a white one is white.
         let id = self.first_id + if self.white.is_some() { before / 2 } else { before } as usize;
         c >= 0.0 && r >= 0.0 && c < n && r < n && self.black(id, c as usize, r as usize)
     }
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn points_and_cells_tell_the_same_marker() {
-        // Odd and even numbers of columns start their rows with other colours.
+        // With odd and with even numbers of columns, rows start with different colours.
         let grid = BoardSpec::MarkerGrid {
             markers: [4, 3],
             marker_mm: 7.0,

@@ -15,31 +15,31 @@ use std::path::Path;
 pub struct Meta {
     /// Version of the file's format; 1 is read.
     pub format: u32,
-    /// A name for what was recorded.
+    /// Name of what was recorded.
     pub set: String,
     /// Unit of boards and poses; only "mm" is read.
     pub units: String,
-    /// What all pictures have in common.
+    /// Properties that all pictures have in common.
     pub image: ImageSpec,
-    /// Which laser was on, where one was.
+    /// Which laser was on, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beam: Option<Beam>,
-    /// The board of all frames, where there is one.
+    /// The board of all frames, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub board: Option<BoardSpec>,
     /// Several boards; frames refer to them by index.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub boards: Vec<BoardSpec>,
-    /// The one picture with the laser off, where a scan has one.
+    /// The picture with the laser off that a scan may have.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ambient: Option<AmbientRef>,
-    /// The moments, one or more; here or in [`Meta::frames_file`].
+    /// The frames, one or more; here or in [`Meta::frames_file`].
     #[serde(default)]
     pub frames: Vec<FrameRef>,
     /// Name of a file with one frame a line (JSON), which a recorder appends to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frames_file: Option<String>,
-    /// What moved between the frames; the robot with the sensor where nothing is said.
+    /// What moved between the frames; if not stated, the robot with the sensor.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<Motion>,
     /// The devices that it was recorded from.
@@ -51,13 +51,13 @@ pub struct Meta {
     /// Several pose files for the same pictures, with what they are.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub pose_files: BTreeMap<String, String>,
-    /// Free text: the part.
+    /// Free text: description of the part.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub part: Option<String>,
     /// Path of the part's nominal model, relative to the folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<String>,
-    /// Free text: what stood before the camera.
+    /// Free text: what was before the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<String>,
     /// Free text: from where to where a distance is measured.
@@ -65,7 +65,7 @@ pub struct Meta {
     pub distance_definition: Option<String>,
 }
 
-/// What all pictures of a recording have in common.
+/// Properties that all pictures of a recording have in common.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImageSpec {
@@ -73,15 +73,15 @@ pub struct ImageSpec {
     pub width: u32,
     /// Rows, px.
     pub height: u32,
-    /// Depth of the sensor's grey levels, 8..=16; files of more than 8 have 16.
+    /// Depth of the sensor's grey levels, bits, 8..=16; picture files with more than 8 have 16.
     pub bits: u8,
-    /// Values a pixel, 1; [`super::Recording::channel`] makes one of a colour picture's three.
+    /// Values per pixel, always 1; [`super::Recording::channel`] selects one of a colour picture's three.
     pub channels: u8,
-    /// How the levels follow the light: "linear", "srgb", or a gamma.
+    /// Relation of the levels to the light: "linear", "srgb", or a gamma.
     pub response: Response,
-    /// Where pixel centres are; only "integer coordinates" is read.
+    /// Coordinates of pixel centres; only "integer coordinates" is read.
     pub pixel_centre: String,
-    /// How they were read from the sensor; none where nobody said.
+    /// How the pictures were read from the sensor; none if not stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub readout: Option<Readout>,
 }
@@ -92,7 +92,7 @@ impl ImageSpec {
         [self.width, self.height]
     }
 
-    /// Refuses pixel conventions, depths and sizes that are not read.
+    /// Refuses unsupported pixel conventions, depths and sizes.
     fn check(&self) -> Result<()> {
         if self.pixel_centre != "integer coordinates" {
             return refuse(
@@ -124,7 +124,7 @@ fn refuse(what: String, next: &str) -> Result<()> {
     Err(Fault::input(what).cause("written by another program or by hand").next(next))
 }
 
-/// What the laser is: a sheet or a pointer.
+/// Kind of laser: a sheet or a pointer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Beam {
@@ -134,13 +134,13 @@ pub enum Beam {
     Pointer,
 }
 
-/// Which camera a recording was taken with, and who told where things stood.
+/// The camera that a recording was taken with, and the source of its poses or counts.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sources {
-    /// The source of the pictures: of a camera on a network its serial number, else how it is addressed.
+    /// Source of the pictures: the serial number of a network camera, else the camera's address.
     pub camera: String,
-    /// The source of poses or counts, where there was one.
+    /// Source of poses or counts, if there was one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub poses: Option<String>,
 }
@@ -151,7 +151,7 @@ pub struct Sources {
 pub struct AmbientRef {
     /// File name.
     pub file: String,
-    /// Index into the pose file: where it was taken.
+    /// Index into the pose file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose: Option<usize>,
 }
@@ -163,10 +163,10 @@ impl Meta {
         Meta::parse(&text).map_err(|e| e.at(path.display()))
     }
 
-    /// Parses and checks; refuses unknown keys, units, formats and pixel conventions. What a frames_file holds is
-    /// read and checked by [`super::Recording::open`].
+    /// Parses and checks; refuses unknown keys, units, formats and pixel conventions. The contents of a frames_file
+    /// are read and checked by [`super::Recording::open`].
     pub fn parse(text: &str) -> Result<Meta> {
-        // A mark of the byte order says nothing in UTF-8.
+        // A byte order mark has no meaning in UTF-8.
         let meta: Meta = serde_json::from_str(text.trim_start_matches('\u{feff}')).map_err(|e| {
             Fault::input(format!("is not a recording's meta.json: {e}"))
                 .cause(crate::files::slip_in(
@@ -186,7 +186,7 @@ impl Meta {
         Ok(meta)
     }
 
-    /// [`Meta::parse`]'s, of frames that were read from their own file.
+    /// The checks of [`Meta::parse`], also used for frames read from their own file.
     pub(super) fn check(&self) -> Result<()> {
         if self.format != 1 {
             return refuse(
@@ -221,7 +221,7 @@ impl Meta {
         self.check_references()
     }
 
-    /// A picture was taken at one pose.
+    /// Refuses a picture that is named with two poses.
     fn check_poses(&self) -> Result<()> {
         let mut taken: BTreeMap<&str, (usize, Option<usize>)> = BTreeMap::new();
         for (i, f) in self.frames.iter().enumerate() {
@@ -239,7 +239,7 @@ impl Meta {
         Ok(())
     }
 
-    /// Every frame has a picture, and its board is there.
+    /// Refuses a frame without a picture, or with a board that is not listed.
     fn check_references(&self) -> Result<()> {
         let boards = self.boards.len() + usize::from(self.board.is_some());
         for (i, f) in self.frames.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! In: a recording folder (`meta.json`, pictures, `poses*.json|csv`, counts). Out: what it contains, checked.
+//! In: a recording folder (`meta.json`, pictures, `poses*.json|csv`, counts). Out: its checked contents.
 //! Frame and unit: poses are base_from_flange in mm; boards in mm; see docs/file-formats.md.
 
 mod board;
@@ -37,13 +37,13 @@ use std::path::{Component, Path, PathBuf};
 /// A recording on disk. Pictures are read one at a time, never all at once.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// Where it lies; names of files are relative to it.
+    /// The folder; file names are relative to it.
     pub folder: PathBuf,
     /// Content of its `meta.json`, checked.
     pub meta: Meta,
-    /// Which part of colour pictures is used.
+    /// Which channel of colour pictures is used.
     pub channel: Channel,
-    /// Whether files outside the folder may be read: meta.json comes from elsewhere, and a person has to say so.
+    /// Whether files outside the folder may be read. meta.json may come from elsewhere, so the user has to allow it.
     pub outside: bool,
 }
 
@@ -80,7 +80,7 @@ impl Recording {
         Ok(recording)
     }
 
-    /// The frames of a recorder's own file, their poses numbered.
+    /// Reads the frames of a recorder's frames file and numbers their poses.
     fn read_frames(&mut self) -> Result<()> {
         let Some(name) = &self.meta.frames_file else { return Ok(()) };
         let mut frames = frames::load(&self.inside(name)?)?;
@@ -95,12 +95,12 @@ impl Recording {
         self.meta.check()
     }
 
-    /// The poses that frames carry themselves, in order.
+    /// The poses that the frames themselves hold, in order.
     fn carried(&self) -> Vec<Rigid<Base, Flange>> {
         self.meta.frames.iter().filter_map(|f| f.taken.as_ref()?.base_from_flange).collect()
     }
 
-    /// Refuses a recording of the other beam, where meta.json says which one it shows.
+    /// Refuses a recording of the other beam, if meta.json states the beam.
     pub fn shows(&self, wanted: Beam) -> Result<()> {
         let name = |b: Beam| if b == Beam::Line { "line" } else { "pointer" };
         match self.meta.beam.filter(|b| *b != wanted) {
@@ -116,19 +116,19 @@ impl Recording {
         }
     }
 
-    /// Depth of the pictures as [`Recording::picture`] gives them.
+    /// Depth of the pictures that [`Recording::picture`] returns, bits.
     pub fn bits(&self) -> u8 {
         self.meta.image.response.depth(self.meta.image.bits)
     }
 
-    /// Where one of the recording's own files lies; refuses what leads out of the folder.
+    /// Path of one of the recording's files; refuses a path that leads out of the folder.
     pub fn inside(&self, name: &str) -> Result<PathBuf> {
         let name = raw::place(name).map_or(name, |(file, _)| file);
         let path = self.folder.join(name);
         let plain = Path::new(name).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
         let within = || match (path.canonicalize(), self.folder.canonicalize()) {
             (Ok(file), Ok(folder)) => file.starts_with(folder),
-            // What is not there is said where it is read.
+            // A missing file is reported where it is read.
             _ => true,
         };
         if self.outside || (plain && within()) {
@@ -139,8 +139,8 @@ impl Recording {
             .next("copy the pictures into the recording, or allow it with --pictures-outside"))
     }
 
-    /// Reads a picture of the recording's camera from anywhere, its levels made linear; of another size than
-    /// meta.json says none is decoded.
+    /// Reads a picture of the recording's camera from any path and makes its levels linear. A picture of another
+    /// size than meta.json states is refused before it is decoded.
     pub fn load(&self, path: &Path) -> Result<Image> {
         let spec = &self.meta.image;
         let depth = Depth {
@@ -160,8 +160,8 @@ impl Recording {
         Ok(spec.response.linear(raw::load(&path, number, [spec.width, spec.height], spec.bits)?))
     }
 
-    /// Which of `poses` the robot stood at in frame `index`. Frames that do not say are paired in order, and then
-    /// there must be as many poses as frames.
+    /// The pose of frame `index` among `poses`. Frames that name no pose are paired in order, and then there must be
+    /// as many poses as frames.
     pub fn pose_of<'a, T>(&self, index: usize, poses: &'a [T]) -> Result<&'a T> {
         let frame = &self.meta.frames[index];
         let frames = self.meta.frames.len();
@@ -186,8 +186,7 @@ impl Recording {
         self.pose_file(name).map(|f| f.poses)
     }
 
-    /// The poses in file `name` (without extension), or in the file that meta.json names, and what a person should
-    /// know of them.
+    /// The poses in file `name` (without extension), or in the file that meta.json names, with warnings about them.
     pub fn pose_file(&self, name: Option<&str>) -> Result<PoseFile> {
         if name.is_none() && self.meta.pose_file.is_none() {
             let poses = self.carried();

@@ -1,31 +1,31 @@
-//! In: `motion` of meta.json. Out: what moved between the frames, and what tells where it stood, checked.
+//! In: `motion` of meta.json. Out: what moved between the frames, and what states its position, checked.
 //! Frame and unit: counts in the unit that `motion` states, from its zero; robot poses are base_from_flange, mm.
 
 use super::frame::FrameRef;
 use crate::fault::{Fault, Result};
 use crate::geometry::{AxisKind, CountUnit};
 
-/// What brings part and light past each other.
+/// What moves part and light relative to each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum MotionKind {
-    /// The robot; poses tell where it stood.
+    /// The robot; poses state its position.
     #[default]
     Robot,
-    /// A linear axis; counts tell where it stood.
+    /// A linear axis; counts state its position.
     Linear,
-    /// A turntable; counts tell where it stood.
+    /// A turntable; counts state its position.
     Turntable,
 }
 
-/// What is moved; the other one stands still.
+/// What is moved; the other one is fixed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Carries {
-    /// Camera and laser; the part stands still.
+    /// Camera and laser; the part is fixed.
     #[default]
     Sensor,
-    /// The part; camera and laser stand still.
+    /// The part; camera and laser are fixed.
     Part,
 }
 
@@ -37,13 +37,13 @@ pub struct Motion {
     pub kind: MotionKind,
     /// What it moves.
     pub carries: Carries,
-    /// What a count is; of an axis.
+    /// Unit of a count; for an axis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<CountUnit>,
-    /// The count at which the axis frame stands; 0 unless stated.
+    /// The count at which the axis frame is defined; 0 unless stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zero: Option<f64>,
-    /// Counts from one trigger pulse to the next, where the axis triggers the camera.
+    /// Counts from one trigger pulse to the next, if the axis triggers the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub counts_per_shot: Option<f64>,
     /// Name of a file of counts (CSV).
@@ -51,11 +51,11 @@ pub struct Motion {
     pub counts_file: Option<String>,
 }
 
-/// For an axis whose counts nobody wrote down.
+/// Advice for an axis whose counts were not recorded.
 const WAYS: &str = "give every frame a \"count\", name a \"counts_file\", or state \"counts_per_shot\"";
 
 impl Motion {
-    /// The axis that moves; none where a robot does.
+    /// The axis that moves; none if a robot moves.
     pub fn axis(&self) -> Option<AxisKind> {
         match self.kind {
             MotionKind::Robot => None,
@@ -64,7 +64,7 @@ impl Motion {
         }
     }
 
-    /// Name of the frame that clouds of such recordings are in: docs/conventions.md.
+    /// Name of the frame of clouds from such recordings: docs/conventions.md.
     pub fn frame(&self) -> &'static str {
         match (self.kind, self.carries) {
             (MotionKind::Robot, Carries::Sensor) => "base",
@@ -125,5 +125,5 @@ impl Motion {
     }
 }
 
-/// 2^53: the integers that f64 holds.
+/// 2^53: up to this f64 represents every integer.
 pub(super) const MOST: f64 = 9e15;

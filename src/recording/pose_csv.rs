@@ -1,15 +1,15 @@
 //! In: a pose file in CSV. Out: numbered rows of numbers in the convention that the file names; columns, units and
-//! order must be that convention's.
-//! Frame and unit: as the convention says (docs/conventions.md).
+//! order must match that convention.
+//! Frame and unit: those of the convention (docs/conventions.md).
 
 use crate::fault::{Fault, Result};
 use crate::files::{TableRow, table};
 use crate::robot::Convention;
 
-/// One pose: its number, the convention, its numbers.
+/// One pose: its number, its convention, its values.
 pub(super) type Row = (usize, Convention, Vec<f64>);
 
-/// The rows of a file, and whether its header says the units of lengths and of angles.
+/// The rows of a file, and whether its header states the units of lengths and of angles.
 pub(super) struct Read {
     pub rows: Vec<Row>,
     pub length_stated: bool,
@@ -31,7 +31,7 @@ pub(super) fn read(text: &str) -> Result<Read> {
     Ok(Read { length_stated: stated(|h| h.length_stated), angle_stated: stated(|h| h.angle_stated), rows })
 }
 
-/// What the last comment before the header names.
+/// The convention that the last comment before the header names.
 fn convention(text: &str) -> Result<Option<Convention>> {
     let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim);
     let comments = lines.take_while(|l| l.is_empty() || l.starts_with('#'));
@@ -42,13 +42,13 @@ fn convention(text: &str) -> Result<Option<Convention>> {
 
 struct Header {
     convention: Convention,
-    /// Denso's figure is the last column.
+    /// Whether the last column is Denso's figure.
     figure: bool,
     length_stated: bool,
     angle_stated: bool,
 }
 
-/// A unit in any of its spellings, as the conventions' labels have it.
+/// A unit in any of its spellings, converted to the spelling of the conventions' labels.
 fn unit(word: &str) -> Option<&'static str> {
     match word {
         "mm" | "millimetre" | "millimetres" | "millimeter" | "millimeters" => Some("mm"),
@@ -59,7 +59,7 @@ fn unit(word: &str) -> Option<&'static str> {
     }
 }
 
-/// A column's name and unit: `RX_deg`, `rx [deg]`, `RX deg` are `rx` in `deg`.
+/// A column's name and unit: `RX_deg`, `rx [deg]` and `RX deg` all give `rx` in `deg`.
 fn column(cell: &str) -> (String, Option<String>) {
     let lower = cell.to_lowercase();
     let mut words = lower.split(|c: char| !c.is_alphanumeric() && c != '°').filter(|w| !w.is_empty());

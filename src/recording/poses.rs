@@ -1,5 +1,5 @@
 //! In: pose files (JSON matrices, CSV matrices, CSV in a named robot convention). Out: base_from_flange.
-//! Frame and unit: base and flange; the file states or names its units, the result is mm.
+//! Frame and unit: base and flange; the file states its units, the result is in mm.
 
 use super::pose_csv::Row;
 use crate::fault::{Fault, Result};
@@ -7,14 +7,14 @@ use crate::geometry::{Base, Flange, ORTHONORMAL_WARN, Rigid};
 use crate::robot::{Convention, Written};
 use std::path::{Path, PathBuf};
 
-/// The poses of a file, and what a person should know about them.
+/// The poses of a file, with warnings about them.
 #[derive(Clone, Debug)]
 pub struct PoseFile {
     /// base_from_flange, mm, in the file's order.
     pub poses: Vec<Rigid<Base, Flange>>,
     /// The numbers that each pose was read from.
     pub written: Vec<Written>,
-    /// Repairs above the warning limit, in words.
+    /// Warnings about rotations repaired by more than the warning limit.
     pub warnings: Vec<String>,
 }
 
@@ -34,10 +34,10 @@ struct JsonPose {
     matrix: [f64; 16],
 }
 
-/// Two files that say the same, one of them with few digits, mm and rad.
+/// Tolerance between two files with the same poses, one of them with few digits, mm and rad.
 const SAME: [f64; 2] = [0.01, 2e-4];
 
-/// `NAME`, or `NAME.json` or `NAME.csv` in a folder; where both are there they must agree.
+/// Loads `NAME`, or `NAME.json` or `NAME.csv` in a folder; if both exist they must agree.
 pub(super) fn find_and_load(folder: &Path, name: &str) -> Result<PoseFile> {
     let candidates = [folder.join(name), folder.join(format!("{name}.json")), folder.join(format!("{name}.csv"))];
     let there: Vec<&PathBuf> = candidates.iter().filter(|p| p.is_file()).collect();
@@ -75,7 +75,7 @@ fn agree(a: &[Rigid<Base, Flange>], b: &[Rigid<Base, Flange>]) -> std::result::R
     Ok(())
 }
 
-/// The files of a folder that can be poses by their name.
+/// The files of a folder whose names suggest poses.
 fn names_in(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).map_or(Vec::new(), |all| all.flatten().map(|e| e.file_name()).collect());
     let mut names: Vec<String> = entries
@@ -88,12 +88,13 @@ fn names_in(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Farthest that a flange can be from its base, mm: ten times the reach of the longest arms, on a rail.
+/// Largest distance of a flange from its base, mm: ten times the reach of the longest arms, on a rail.
 const FARTHEST: f64 = 1e5;
-/// Poses that all lie this near to the base's origin, mm, are in metres: no arm works inside its own foot.
+/// Poses that all lie within this distance of the base's origin, mm, are in metres: no arm works inside its own
+/// foot.
 const METRES: f64 = 8.0;
 
-/// Loads a pose file by its extension: `.json`, or `.csv`/`.txt`.
+/// Loads a pose file according to its extension: `.json`, or `.csv`/`.txt`.
 pub fn load_poses(path: &Path) -> Result<PoseFile> {
     let text = crate::files::read_text(path)?;
     let json = path.extension().is_some_and(|e| e == "json");
@@ -138,14 +139,14 @@ fn collect(rows: Vec<Row>) -> Result<PoseFile> {
     Ok(out)
 }
 
-/// A Denso file may have the arm's figure in a last column.
+/// Drops the arm's figure, which a Denso file may have in a last column.
 fn without_figure(convention: Convention, mut numbers: Vec<f64>) -> Vec<f64> {
     numbers.truncate(convention.labels().len());
     numbers
 }
 
 impl PoseFile {
-    /// Poses that came as transforms, without a file of their own.
+    /// Poses that came as transforms, without a pose file.
     pub(super) fn of(poses: Vec<Rigid<Base, Flange>>) -> PoseFile {
         PoseFile { written: poses.iter().map(Written::matrix).collect(), poses, warnings: Vec::new() }
     }
@@ -155,7 +156,7 @@ impl PoseFile {
     }
 }
 
-/// What is odd about poses that all lie in the robot's own foot: a sentence, or `None`.
+/// A warning if all poses lie within the robot's own foot; otherwise `None`.
 pub fn looks_like_metres(poses: &[Rigid<Base, Flange>]) -> Option<String> {
     let reach = poses.iter().map(|p| p.translation.norm()).fold(0.0, f64::max);
     (poses.len() > 2 && reach < METRES).then(|| {
@@ -182,7 +183,7 @@ fn from_csv(text: &str) -> Result<PoseFile> {
     }
 }
 
-/// Asks about angles that look like the other unit; a unit in the header is the answer.
+/// Refuses angles that look like the other unit, until the header states the unit.
 fn looks_like_another_unit(convention: Convention, rows: &[Row]) -> Result<()> {
     let Some((angles, degrees)) = convention.angles() else { return Ok(()) };
     let of = |row: &Row| row.2.get(angles.clone()).unwrap_or_default().iter().fold(0.0, |m: f64, a| m.max(a.abs()));
@@ -209,7 +210,7 @@ fn from_json(text: &str) -> Result<PoseFile> {
     collect(json_rows(text, "base_T_flange")?)
 }
 
-/// Poses written as matrices of the transform that is named.
+/// Reads poses written as matrices of the named transform.
 pub(super) fn json_rows(text: &str, transform: &str) -> Result<Vec<Row>> {
     let file: JsonPoses = serde_json::from_str(text).map_err(|e| {
         Fault::input(format!("is not a pose file: {e}"))

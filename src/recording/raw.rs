@@ -6,19 +6,19 @@ use crate::raster::Image;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// The file and the number that a picture's name means; none where it names a picture file.
+/// The file and the frame number in a picture's name; none if it names a picture file.
 pub(super) fn place(name: &str) -> Option<(&str, u64)> {
     let (file, number) = name.rsplit_once('#')?;
     file.ends_with(".raw").then_some(())?;
     number.parse().ok().map(|n| (file, n))
 }
 
-/// What a picture inside such a file is called.
+/// Name of a picture inside such a file.
 pub fn raw_name(file: &str, number: u64) -> String {
     format!("{file}#{number}")
 }
 
-/// Reads frame `number` of a file of frames of this size and depth. Refused: a file that ends before it, a level
+/// Reads frame `number` of a file of frames of this size and depth. Refuses a file that ends before it, and a level
 /// above the depth.
 pub(super) fn load(path: &Path, number: u64, [width, height]: [u32; 2], bits: u8) -> Result<Image> {
     let bytes = width as usize * height as usize * if bits > 8 { 2 } else { 1 };

@@ -1,5 +1,5 @@
-//! Who says how pictures were read from the sensor: their source, meta.json, or a person where those do not; and the
-//! sensor's hot pixels, which show it.
+//! The statement of how pictures were read from the sensor: from their source, from meta.json, or from the user if
+//! those have none. The sensor's hot pixels serve to check it.
 
 use super::Recording;
 use crate::camera::Readout;
@@ -7,13 +7,13 @@ use crate::fault::{Fault, Result};
 use crate::raster::HotPixels;
 use rayon::prelude::*;
 
-/// Pictures that are looked at, evenly taken: more would find the same pixels.
+/// Number of pictures examined, evenly spaced: more would find the same pixels.
 const MOST: usize = 24;
 
-/// How pictures were read from the sensor: by their source, or by a person where that does not say.
+/// How pictures were read from the sensor: as their source states, or as the user states if the source does not.
 ///
 /// # Errors
-/// Both say it.
+/// Both state it.
 pub fn stated_once(source: Option<Readout>, word: Option<Readout>) -> Result<Option<Readout>> {
     if let (Some(known), Some(word)) = (source, word) {
         return Err(Fault::usage(format!("the recording states the readout {known}, but the option states {word}"))
@@ -23,10 +23,11 @@ pub fn stated_once(source: Option<Readout>, word: Option<Readout>) -> Result<Opt
     Ok(source.or(word))
 }
 
-/// How the pictures of recordings of one camera were read from its sensor; none where one of them does not say.
+/// How the pictures of recordings of one camera were read from its sensor; none if any of the recordings does not
+/// state it.
 ///
 /// # Errors
-/// Recordings say different things: their pixels are of different places.
+/// Recordings state different readouts: their pixels are of different places on the sensor.
 pub fn one_readout(recordings: &[Recording]) -> Result<Option<Readout>> {
     let mut stated = recordings.iter().filter_map(|r| Some((r, r.meta.image.readout?)));
     let Some((first, readout)) = stated.next() else { return Ok(None) };
@@ -42,8 +43,8 @@ pub fn one_readout(recordings: &[Recording]) -> Result<Option<Readout>> {
     Ok(recordings.iter().all(|r| r.meta.image.readout.is_some()).then_some(readout))
 }
 
-/// The hot pixels of the camera that took these recordings: of the pictures with the laser, where room light hides
-/// fewer of them, else of all. Pictures that cannot be read are passed over.
+/// The hot pixels of the camera that took these recordings. They are taken from the pictures with the laser on,
+/// where room light hides fewer of them, and from all pictures if those are few. Unreadable pictures are skipped.
 pub fn hot_pixels(recordings: &[Recording]) -> HotPixels {
     let frames = || recordings.iter().flat_map(|r| r.meta.frames.iter().map(move |f| (r, f)));
     let mut pictures: Vec<(&Recording, &String)> = frames().filter_map(|(r, f)| Some((r, f.laser.as_ref()?))).collect();
@@ -61,20 +62,20 @@ pub fn hot_pixels(recordings: &[Recording]) -> HotPixels {
 }
 
 impl Recording {
-    /// Takes a person's word for how its pictures were read from the sensor.
+    /// Sets the readout that the user states for its pictures.
     ///
     /// # Errors
-    /// meta.json says it too.
+    /// meta.json states a readout too.
     pub fn read_out_as(&mut self, word: Option<Readout>) -> Result<()> {
         self.meta.image.readout = stated_once(self.meta.image.readout, word)?;
         Ok(())
     }
 
-    /// Compares its hot pixels with those that calibrations know.
+    /// Compares its hot pixels with those of calibrations.
     ///
     /// # Errors
-    /// Pictures that are turned, mirrored or moved against those of the calibration. Nothing is said where either side
-    /// shows too few hot pixels.
+    /// Pictures that are turned, mirrored or shifted relative to those of the calibration. Nothing is reported if
+    /// either side has too few hot pixels.
     pub fn read_alike(&self, known: &[[u32; 2]]) -> Result<()> {
         if known.is_empty() {
             return Ok(());

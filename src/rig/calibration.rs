@@ -1,5 +1,5 @@
-//! In: a calibrated value and what its solver knows about it. Out: the record that is kept on disk.
-//! Frame and unit: stated in the record; covariances in the units of their parameters squared.
+//! In: a calibrated value and what its solver reports about it. Out: the record that is stored on disk.
+//! Frame and unit: stated in the record; covariances in products of their parameters' units.
 
 use super::hash::{hash_text, hex};
 use super::kind::{Place, Units};
@@ -15,18 +15,18 @@ use std::path::Path;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// What the work needs, with room to spare.
+    /// More than the work needs.
     Good,
-    /// It can be worked with; the reasons say what limits it.
+    /// Suitable for work; the reasons state what limits it.
     Usable,
-    /// The data says too little for the work; better pictures are needed.
+    /// The data do not determine it well enough for the work; better pictures are needed.
     BadlyDetermined,
-    /// It is of no use and is not loaded.
+    /// Unusable; it is not loaded.
     Refused,
 }
 
 impl Verdict {
-    /// For people.
+    /// The verdict as messages show it.
     pub fn words(self) -> &'static str {
         match self {
             Verdict::Good => "good",
@@ -37,37 +37,36 @@ impl Verdict {
     }
 }
 
-/// What a solver says about its result, for people and for later error budgets.
+/// What a solver reports about its result, for the user and for later error budgets.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Quality {
     /// How far the result can be trusted.
     pub verdict: Verdict,
-    /// Why, in words; one sentence each.
+    /// Reasons for the verdict, one sentence each.
     pub reasons: Vec<String>,
-    /// The next best picture to take, in words; empty when nothing is missing.
+    /// The next best picture to take, in words; empty if nothing is missing.
     pub advice: Vec<String>,
     /// Named figures with their unit in the name, e.g. `rms_px`, `holdout_rms_px`,
     /// `expected_error_at_working_distance_mm`.
     pub figures: BTreeMap<String, f64>,
-    /// One entry a picture or pose: name and rms residual with its unit in the key of `figures`.
+    /// One entry per picture or pose: name and rms residual, in the unit of the rms entry of `figures`.
     pub per_picture: Vec<(String, f64)>,
 }
 
-/// Hand-eye transform: the camera on the flange. Covariance parameters, in this order:
-/// `tx_mm ty_mm tz_mm rx_rad ry_rad rz_rad`, the rotation as a left perturbation in the flange
-/// frame: R = exp([rx ry rz]) R̂.
+/// Hand-eye transform: the pose of the camera on the flange. Covariance parameters, in this order: `tx_mm ty_mm
+/// tz_mm rx_rad ry_rad rz_rad`, the rotation as a left perturbation in the flange frame: R = exp([rx ry rz]) R̂.
 pub type HandEye = Rigid<Flange, Camera>;
 
-/// Figures of a hand-eye's quality that ranges are worked out with: the robot's sigma per axis.
+/// Figure of a hand-eye calibration's quality: the robot's position sigma per axis, mm. Ranges are computed with it.
 pub const ROBOT_SIGMA_MM: &str = "robot_sigma_mm";
-/// Of its orientation, degrees; the one above is of its position, mm.
+/// The same for the robot's orientation, degrees.
 pub const ROBOT_SIGMA_DEG: &str = "robot_sigma_deg";
 
 /// A calibrated value with its origin. `T` is `Intrinsics`, `Plane<Camera>`, `Ray<Camera>` or `HandEye`.
 ///
-/// Covariance parameters by kind: [`Kind::parameters`]; a laser plane's has rank 3, along the tangent of the unit
-/// normal, a pointer's beam rank 4; hand-eye see [`HandEye`].
+/// The covariance's parameters depend on the kind: [`Kind::parameters`]; for the hand-eye see [`HandEye`]. A laser
+/// plane's covariance has rank 3, along the tangent of the unit normal, that of a pointer's beam has rank 4.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration<T> {
@@ -75,40 +74,40 @@ pub struct Calibration<T> {
     pub format: u32,
     /// What the value is.
     pub kind: Kind,
-    /// RFC 3339.
+    /// Time of the calibration, RFC 3339.
     pub created: String,
-    /// Program and version.
+    /// Program and version that wrote it.
     pub program: String,
-    /// Of value and covariance.
+    /// Units of value and covariance.
     pub units: Units,
-    /// The frame, or the transform between two, that the value is in.
+    /// The frame of the value, or the transform between two frames that it is.
     pub frame: Place,
-    /// File name to SHA-256 of everything that went in.
+    /// File name and SHA-256 of every input file.
     pub inputs: BTreeMap<String, String>,
-    /// The calibrations that it was made with and is of no use without: kind to [`Calibration::content`].
+    /// The calibrations that it was made with and is useless without: kind and [`Calibration::content`].
     pub rests_on: BTreeMap<Kind, String>,
-    /// Of a camera: how its pictures were read from the sensor, where they said so.
+    /// For a camera: how its pictures were read from the sensor, if they stated it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub readout: Option<Readout>,
-    /// Of a camera and of a laser plane: pixels that shine by themselves in all pictures that were used (column, row),
-    /// px. They tell whether later pictures are read from the sensor in the same way.
+    /// For a camera and for a laser plane: pixels (column, row) that are bright without light in all pictures used,
+    /// px. They show whether later pictures are read from the sensor in the same way.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub hot_pixels: Vec<[u32; 2]>,
-    /// What was found.
+    /// The calibrated value.
     pub value: T,
-    /// Of the value's parameters.
+    /// Covariance of the value's parameters.
     pub covariance: Covariance,
-    /// What the solver says of it.
+    /// The solver's assessment.
     pub quality: Quality,
-    /// What a person has vouched for, and when, and which sigmas an import assumed; every report shows it.
+    /// What a user has vouched for, and when, and which sigmas an import assumed; every report shows it.
     pub remarks: Vec<String>,
 }
 
-/// Of the files that this version writes.
+/// Format of the files that this version writes.
 pub(super) const FORMAT: u32 = 2;
 
 impl<T: Serialize> Calibration<T> {
-    /// `with`: the camera that it was measured with, where it was measured with one.
+    /// `with` is the camera that it was measured with, if any.
     pub fn new(
         kind: Kind,
         value: T,
@@ -116,7 +115,7 @@ impl<T: Serialize> Calibration<T> {
         covariance: Covariance,
         mut quality: Quality,
     ) -> Calibration<T> {
-        // JSON has no number for what is not finite: a figure that could not be worked out is not there.
+        // JSON cannot hold numbers that are not finite: a figure that could not be computed is omitted.
         quality.figures.retain(|_, v| v.is_finite());
         quality.per_picture.retain(|(_, v)| v.is_finite());
         Calibration {
@@ -136,7 +135,8 @@ impl<T: Serialize> Calibration<T> {
             remarks: Vec::new(),
         }
     }
-    /// SHA-256 of what is calculated with: the value and its covariance. Others name it in `rests_on`.
+    /// SHA-256 of the value and its covariance, which results are computed from. Other records name it in
+    /// `rests_on`.
     pub fn content(&self) -> String {
         let held = (self.kind, self.units, self.frame, &self.value, &self.covariance);
         hash_text(serde_json::to_string(&held).expect("plain data").as_bytes())
@@ -153,8 +153,8 @@ impl<T> Calibration<T> {
 }
 
 impl<T: Measured> Calibration<T> {
-    /// Refuses a record of another kind, frame or format, a value or covariance that is none, and what its own solver
-    /// refused.
+    /// Refuses a record of another kind, frame or format, an invalid value or covariance, and a result that its own
+    /// solver refused.
     pub fn check(&self, kind: Kind) -> Result<()> {
         if self.format != FORMAT || self.kind != kind || self.frame != kind.place() {
             return Err(Fault::input(format!(
@@ -178,20 +178,21 @@ impl<T: Measured> Calibration<T> {
     }
 }
 
-/// Figures of an axis' quality that points are judged by: what it scatters by from stop to stop.
+/// Figure of an axis calibration's quality: the axis' position scatter from stop to stop, mm. Points are judged by
+/// it.
 pub const AXIS_SIGMA_MM: &str = "axis_sigma_mm";
-/// Of its turn, degrees; the one above is of its place, mm.
+/// The same for the axis' rotation, degrees.
 pub const AXIS_SIGMA_DEG: &str = "axis_sigma_deg";
 
-/// What an axis scatters by from stop to stop, mm and rad; `None` where the values come from elsewhere.
+/// Scatter of an axis from stop to stop, mm and rad; `None` if the calibration was not computed here.
 pub fn axis_sigma(quality: &Quality) -> Option<[f64; 2]> {
     let of = |name: &str| quality.figures.get(name).copied();
     Some([of(AXIS_SIGMA_MM)?, of(AXIS_SIGMA_DEG)?.to_radians()])
 }
 
 impl Calibration<HandEye> {
-    /// Sigma of the robot per axis, mm and degrees, that the calibration found; `None` where the values come from
-    /// elsewhere and nothing is known of it.
+    /// Sigma of the robot per axis, mm and degrees, that the calibration found; `None` if the values come from
+    /// elsewhere and nothing is known about the robot.
     pub fn robot_sigma(&self) -> Result<Option<[f64; 2]>> {
         let of = |name: &str| self.quality.figures.get(name).copied();
         match (of(ROBOT_SIGMA_MM), of(ROBOT_SIGMA_DEG)) {

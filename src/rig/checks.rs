@@ -1,6 +1,6 @@
-//! In: calibrated values, from solvers, files and people. Out: a refusal of what no rig is, and a question about what
-//! looks like another unit.
-//! Frame and unit: as the values; mm, px.
+//! In: calibrated values, from solvers, files and users. Out: refusals of values that no rig can have, and a
+//! question about values that look like another unit.
+//! Frame and unit: those of the values; mm, px.
 
 use super::measured::Measured;
 use super::{Rig, Volume};
@@ -8,16 +8,17 @@ use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Axis, AxisKind, Camera, CountUnit, Frame, Plane, Ray, Rigid, Vec2, Vec3};
 
-/// How far from 1 the length of a direction in a file may be: rounding. Longer or shorter ones were edited.
+/// Largest deviation from 1 of the length of a direction in a file, from rounding. Larger deviations come from
+/// edits.
 const UNIT: f64 = 1e-9;
-/// Focal length over the picture's longer side: a field of view of 157 degrees, and of 0.3.
+/// Limits of focal length over the picture's longer side: fields of view of 157 and of 0.3 degrees.
 const FOCAL: [f64; 2] = [0.1, 200.0];
-/// Farthest that a sensor hangs from its flange, and a beam's foot from its camera, mm.
+/// Largest distance of a sensor from its flange, and of a beam's foot point from its camera, mm.
 const FARTHEST: f64 = 5000.0;
-/// Nearer than this to the flange's centre or to the camera's, mm, numbers look like metres.
+/// Distances from the flange's centre or the camera below this, mm, look like metres.
 const METRES: f64 = 2.0;
 
-/// For values of which the caller says no more.
+/// Default advice, for values whose caller gives none.
 const AGAIN: &str = "calibrate again, or import right values with sheetlight station import";
 
 fn bad(what: String, cause: &str) -> Fault {
@@ -106,7 +107,7 @@ impl Measured for Ray<Camera> {
         Ok(())
     }
     fn doubt(&self) -> Option<String> {
-        // The foot of the perpendicular: an origin may lie anywhere along the beam.
+        // The foot of the perpendicular counts, because the origin may lie anywhere along the beam.
         let beside = (self.origin - self.direction * self.origin.dot(&self.direction)).norm();
         (beside < METRES).then(|| format!("the beam passes the camera at {beside:.4} mm, which looks like metres"))
     }
@@ -127,7 +128,7 @@ impl<To: Frame, From: Frame> Measured for Rigid<To, From> {
     }
     fn doubt(&self) -> Option<String> {
         let t = self.translation.norm();
-        // Exactly nothing is a statement: the poses are the camera's own.
+        // Exactly zero is a valid statement: the poses are the camera's own.
         (t > 0.0 && t < METRES)
             .then(|| format!("the camera lies {t:.4} mm from the flange's centre, which looks like metres"))
             .or_else(|| {
@@ -148,7 +149,7 @@ impl Measured for Axis {
             let what = format!("a {} whose counts are in {}", self.kind.words(), self.unit.name());
             return Err(bad(what, "edited by hand"));
         }
-        // A nanometre to a metre a count, and a turntable that does not pass half a turn a count.
+        // Limits: a nanometre to a metre per count, and less than half a turn per count for a turntable.
         let most = if self.kind == AxisKind::Linear { 1e3 } else { std::f64::consts::PI };
         if !(self.pitch.abs() > 1e-9 && self.pitch.abs() < most) {
             let what = format!("the pitch is {} a count, 1e-9 to {most:.4} is accepted", self.pitch);
@@ -159,7 +160,7 @@ impl Measured for Axis {
 }
 
 impl Rig {
-    /// Refuses a laser plane that the camera sees nowhere in the working volume.
+    /// Refuses a laser plane that is nowhere visible to the camera in the working volume.
     pub fn reaches(&self, volume: Option<&Volume>) -> Result<()> {
         let depth_mm = Volume::depths(volume);
         let (Some(camera), Some(laser)) = (&self.camera, &self.laser_plane) else { return Ok(()) };

@@ -1,4 +1,4 @@
-//! In: what a solver or a file says of its parameters' errors. Out: the covariance, checked to be one.
+//! In: what a solver or a file states about its parameters' errors. Out: the covariance, checked for validity.
 //! Frame and unit: units of the parameters, which are in their names, multiplied.
 
 use super::Kind;
@@ -6,19 +6,19 @@ use crate::fault::{Fault, Result};
 use crate::geometry::not_a_covariance;
 use nalgebra::{DMatrix, SMatrix};
 
-/// Covariance of named parameters; `matrix[i][j]` belongs to `parameters[i]`, `parameters[j]`.
-/// Each name ends with its unit: `fx_px`, `tx_mm`, `rx_rad`. Without parameters it is not known.
+/// Covariance of named parameters; `matrix[i][j]` belongs to `parameters[i]`, `parameters[j]`. Each name ends with
+/// its unit: `fx_px`, `tx_mm`, `rx_rad`. Without parameters the covariance is unknown.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Covariance {
-    /// Names, in the order of the matrix; empty where nothing is known.
+    /// Names, in the order of the matrix; empty if the covariance is unknown.
     pub parameters: Vec<String>,
     /// Square and symmetric, row by row.
     pub matrix: Vec<Vec<f64>>,
 }
 
 impl Covariance {
-    /// `matrix` has a row and a column a name; anything else is a panic.
+    /// `matrix` must have one row and one column per name; anything else panics.
     pub fn new(parameters: &[&str], matrix: &DMatrix<f64>) -> Covariance {
         assert_eq!((parameters.len(), parameters.len()), matrix.shape());
         Covariance {
@@ -31,7 +31,7 @@ impl Covariance {
         let i = self.parameters.iter().position(|p| p == name)?;
         Some(self.matrix.get(i)?.get(i)?.max(0.0).sqrt())
     }
-    /// The covariance of these parameters in this order; those that it does not name count as known.
+    /// The covariance of these parameters in this order; parameters that it does not name count as exactly known.
     pub fn of<const N: usize>(&self, names: [&str; N]) -> SMatrix<f64, N, N> {
         let at = names.map(|n| self.parameters.iter().position(|p| p == n));
         SMatrix::from_fn(|i, j| match (at[i], at[j]) {
@@ -39,14 +39,14 @@ impl Covariance {
             _ => 0.0,
         })
     }
-    /// As a matrix; [`Covariance::check`] has seen to its shape.
+    /// As a matrix. [`Covariance::check`] guarantees the shape.
     pub fn to_matrix(&self) -> DMatrix<f64> {
         let n = self.parameters.len();
         DMatrix::from_fn(n, n, |i, j| self.matrix[i][j])
     }
 
-    /// Refuses what is no covariance of this kind's parameters: other names or another order, another shape, numbers
-    /// that are not finite, a matrix that is not symmetric or not positive semidefinite.
+    /// Refuses anything that is no covariance of this kind's parameters: other names or another order, another
+    /// shape, numbers that are not finite, a matrix that is not symmetric or not positive semidefinite.
     pub fn check(&self, kind: Kind) -> Result<()> {
         let bad = |what: String| {
             Err(Fault::input(format!("the covariance {what}"))
@@ -55,7 +55,7 @@ impl Covariance {
         };
         let (names, counts) = kind.parameters();
         let n = self.parameters.len();
-        // A camera's further terms are named where they were free, in their order.
+        // A camera's further terms are named if they were free, in their order.
         let given = |from: usize, name: &String| names[from..].iter().position(|n| n == name).map(|i| from + i + 1);
         let in_order = |from: usize| self.parameters[from..].iter().try_fold(from, &given).is_some();
         let begins = |&c: &usize| c <= n && self.parameters[..c].iter().eq(names[..c].iter());
@@ -85,7 +85,7 @@ mod tests {
     #[test]
     fn only_covariances_pass() {
         let names = Kind::LaserPlane.parameters().0;
-        // Rank 3: a unit normal's error lies along its tangent.
+        // Rank 3: the error of a unit normal lies along its tangent.
         let root = DMatrix::from_fn(4, 3, |i, j| ((i * 7 + j * 3) % 5) as f64 * if i == 3 { 0.1 } else { 1e-4 });
         let good = Covariance::new(names, &(&root * root.transpose()));
         good.check(Kind::LaserPlane).unwrap();

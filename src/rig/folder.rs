@@ -1,5 +1,5 @@
-//! In: a station folder. Out: the rig in its `calibration/` subfolder, loaded and stored so that no file is ever
-//! half-replaced, the former one stays beside it, and what does not belong together is not used together.
+//! In: a station folder. Out: the rig in its `calibration/` subfolder. Storing never leaves a file half replaced and
+//! keeps the previous file beside it; records that do not belong together are not used together.
 //! Frame and unit: as in the records.
 
 use super::calibration::FORMAT;
@@ -12,7 +12,7 @@ use crate::geometry::{Axis, AxisKind, Base, Camera, Plane, Ray, Rigid};
 use serde::{Serialize, de::DeserializeOwned};
 use std::path::{Path, PathBuf};
 
-/// What has been measured of a station; every part may be missing.
+/// The calibrations of a station; every part may be missing.
 #[derive(Clone, Debug, Default)]
 pub struct Rig {
     /// Camera and lens.
@@ -21,28 +21,28 @@ pub struct Rig {
     pub laser_plane: Option<Calibration<Plane<Camera>>>,
     /// The pointer's beam, camera frame.
     pub pointer: Option<Calibration<Ray<Camera>>>,
-    /// The camera on the flange.
+    /// Pose of the camera on the flange.
     pub hand_eye: Option<Calibration<HandEye>>,
-    /// A camera that stands still before a robot that carries the part.
+    /// Pose of a fixed camera, before a robot that carries the part.
     pub base_camera: Option<Calibration<Rigid<Base, Camera>>>,
-    /// What moves parts along, or the camera along parts.
+    /// Linear axis that moves the parts, or moves the camera along them.
     pub linear_axis: Option<Calibration<Axis>>,
-    /// What turns parts before the camera.
+    /// Turntable that turns the parts before the camera.
     pub turntable: Option<Calibration<Axis>>,
-    /// Covariance of the records together, where they were calibrated together.
+    /// Joint covariance of the records, if they were calibrated together.
     pub joint: Joint,
 }
 
-/// What a record says of itself, whatever its value is.
+/// Metadata of a record, independent of its value.
 #[derive(Clone, Copy, Debug)]
 pub struct Record<'a> {
-    /// Which one.
+    /// Kind of the record.
     pub kind: Kind,
-    /// When it was measured, RFC 3339.
+    /// Time of the measurement, RFC 3339.
     pub created: &'a str,
-    /// How well.
+    /// Quality of the result.
     pub quality: &'a Quality,
-    /// What people have vouched for.
+    /// What users have vouched for.
     pub remarks: &'a [String],
 }
 
@@ -53,7 +53,7 @@ impl<'a> Record<'a> {
 }
 
 impl Rig {
-    /// Loads and checks what there is in `station/calibration`.
+    /// Loads and checks the records that exist in `station/calibration`.
     pub fn load(station: &Path) -> Result<Rig> {
         let folder = station.join("calibration");
         together(&folder).settle()?;
@@ -74,20 +74,20 @@ impl Rig {
         })
     }
 
-    /// For a calibration made with the camera: a spoilt former result is not in its own way, nor in another's. The
-    /// laser plane, where it can be read, says where the station works.
+    /// Loads the rig for a calibration that uses the camera. A spoilt earlier result, of this or of another kind,
+    /// must not prevent it. The laser plane, if readable, states where the station works.
     pub fn load_to_calibrate(station: &Path) -> Result<Rig> {
         Ok(Rig { laser_plane: load(station, Kind::LaserPlane).unwrap_or(None), ..Rig::load_camera(station)? })
     }
 
-    /// The camera alone.
+    /// Loads the camera only.
     pub fn load_camera(station: &Path) -> Result<Rig> {
         Ok(Rig { camera: load(station, Kind::Camera)?, ..Rig::default() })
     }
 
-    /// Stores one calibration under `station/calibration/<kind>.json` and, where there is one, its `page` beside it
-    /// as `<kind>.html`; a former one is kept as `<kind>.previous.json`. Either the new file is complete or the old
-    /// one is untouched.
+    /// Stores one calibration under `station/calibration/<kind>.json`, and its `page`, if given, beside it as
+    /// `<kind>.html`. The previous calibration is kept as `<kind>.previous.json`. Either the new file is complete or
+    /// the old one is untouched.
     pub fn store<T: Serialize + Measured>(
         station: &Path,
         calibration: &Calibration<T>,
@@ -108,13 +108,14 @@ impl Rig {
         Ok(path)
     }
 
-    /// Stores every part that is there, all of them or none; former ones are kept as [`Rig::store`] keeps them.
+    /// Stores every part of the rig, all of them or none; previous records are kept as by [`Rig::store`].
     pub fn store_all(&self, station: &Path) -> Result<Vec<Kind>> {
         self.store_all_with(station, |_| Vec::new())
     }
 
-    /// [`Rig::store_all`] together with files (name, text) that are of these records and of no others; they are made
-    /// from the rig as a reader will find it: a rotation comes back from its file orthonormal to the last digit.
+    /// As [`Rig::store_all`], together with files (name, text) that belong to exactly these records. The files are
+    /// made from the rig as a reader will load it, because a rotation read from its file is orthonormal to the last
+    /// digit.
     pub fn store_all_with(
         &self,
         station: &Path,
@@ -147,8 +148,8 @@ impl Rig {
         Ok(texts.into_iter().map(|(kind, _)| kind).collect())
     }
 
-    /// Seals a file anew that has no seal, was edited, or rests on another camera, because a person says why. The
-    /// remark stays with it. What is no calibration at all is refused even so.
+    /// Seals a file again that has no seal, was edited, or depends on another camera; the user states the reason.
+    /// The remark stays in the file. A file that is no calibration at all is still refused.
     pub fn vouch<T: Serialize + DeserializeOwned + Measured>(
         station: &Path,
         kind: Kind,
@@ -162,7 +163,7 @@ impl Rig {
         let (mut value, _) = apart(&text, &what).map_err(redo)?;
         let today = jiff::Timestamp::now().strftime("%Y-%m-%d");
         let object = value.as_object_mut().expect("apart refuses all else");
-        // Format 1 named frames as each writer liked, and had neither of the two lists.
+        // In format 1 every writer chose its own names of frames, and the two lists were missing.
         object.insert("format".into(), FORMAT.into());
         object.insert("frame".into(), serde_json::to_value(kind.place()).expect("a name"));
         object.entry("rests_on").or_insert_with(|| serde_json::json!({}));
@@ -178,34 +179,34 @@ impl Rig {
         Rig::store(station, &c, None)
     }
 
-    /// The camera, or what to do about its absence.
+    /// The camera; if it is missing, an error that says what to do.
     pub fn need_camera(&self) -> Result<&Calibration<Intrinsics>> {
         self.camera.as_ref().ok_or_else(|| missing(Kind::Camera))
     }
-    /// The sensor's hot pixels as its calibrations know them: the laser plane's, whose pictures are dark, else the
-    /// camera's. In room light a speck of the background looks like a hot pixel to a camera that stands still.
+    /// The sensor's hot pixels as the calibrations know them: the laser plane's, whose pictures are dark, else the
+    /// camera's. In room light a fixed camera may take a speck of the background for a hot pixel.
     pub fn hot_pixels(&self) -> &[[u32; 2]] {
         let of = [self.laser_plane.as_ref().map(|c| &c.hot_pixels), self.camera.as_ref().map(|c| &c.hot_pixels)];
         of.into_iter().flatten().find(|hot| !hot.is_empty()).map_or(&[], |hot| hot)
     }
 
-    /// The sheet of light; refused where it is missing or was measured with another camera.
+    /// The sheet of light; an error if it is missing or was measured with another camera.
     pub fn need_laser_plane(&self) -> Result<&Calibration<Plane<Camera>>> {
         self.belonging(&self.laser_plane)?.ok_or_else(|| missing(Kind::LaserPlane))
     }
-    /// The pointer's beam; refused where it is missing or was measured with another camera.
+    /// The pointer's beam; an error if it is missing or was measured with another camera.
     pub fn need_pointer(&self) -> Result<&Calibration<Ray<Camera>>> {
         self.belonging(&self.pointer)?.ok_or_else(|| missing(Kind::Pointer))
     }
-    /// The camera on the flange; refused where it is missing or was measured with another camera.
+    /// Pose of the camera on the flange; an error if it is missing or was measured with another camera.
     pub fn need_hand_eye(&self) -> Result<&Calibration<HandEye>> {
         self.belonging(&self.hand_eye)?.ok_or_else(|| missing(Kind::HandEye))
     }
-    /// The camera that stands still; refused where it is missing or was measured with another camera.
+    /// Pose of the fixed camera; an error if it is missing or was measured with another camera.
     pub fn need_base_camera(&self) -> Result<&Calibration<Rigid<Base, Camera>>> {
         self.belonging(&self.base_camera)?.ok_or_else(|| missing(Kind::BaseCamera))
     }
-    /// The axis of this kind; refused where it is missing or was measured with another camera.
+    /// The axis of this kind; an error if it is missing or was measured with another camera.
     pub fn need_axis(&self, kind: AxisKind) -> Result<&Calibration<Axis>> {
         let (axis, kind) = match kind {
             AxisKind::Linear => (&self.linear_axis, Kind::LinearAxis),
@@ -213,10 +214,10 @@ impl Rig {
         };
         self.belonging(axis)?.ok_or_else(|| missing(kind))
     }
-    /// The axis of a rig that has one.
+    /// The rig's axis, if it has one.
     ///
     /// # Errors
-    /// It has a linear axis and a turntable. The motion of a recording says which of them moved:
+    /// A rig with both a linear axis and a turntable. The motion of a recording states which of them moved:
     /// [`crate::scan::parts_for`].
     pub fn axis(&self) -> Result<Option<&Calibration<Axis>>> {
         match (&self.linear_axis, &self.turntable) {
@@ -229,7 +230,7 @@ impl Rig {
         }
     }
 
-    /// What every record that there is says of itself.
+    /// Metadata of every existing record.
     pub fn records(&self) -> Vec<Record<'_>> {
         [
             self.camera.as_ref().map(Record::of),
@@ -250,7 +251,7 @@ impl Rig {
         file(station, kind).is_file()
     }
 
-    /// Refuses parts of which one was measured with another camera than the station's.
+    /// Refuses a rig if one of its parts was measured with another camera than the station's.
     pub fn belong_together(&self) -> Result<()> {
         self.belonging(&self.laser_plane)?;
         self.belonging(&self.pointer)?;
@@ -275,10 +276,11 @@ impl Rig {
         .next(again(kind)))
     }
 
-    /// The covariance of camera, laser plane and the camera's place together. `None` where none was ever stated.
+    /// The joint covariance of camera, laser plane and the camera's pose. `None` if none was ever stated.
     ///
     /// # Errors
-    /// Why what is stated is not of these records: one was exchanged since, or the file is spoilt. In words.
+    /// The reason, in words, why the stated covariance does not apply to these records: a record was replaced since,
+    /// or the file is spoilt.
     pub fn joint(&self) -> Option<std::result::Result<&JointCovariance, String>> {
         let stated = match &self.joint {
             Joint::Absent => return None,
@@ -297,8 +299,8 @@ impl Rig {
         Some(stated.other(&now).map_or(Ok(stated), |kind| Err(other(kind))))
     }
 
-    /// What a report must say of the calibrations it rests on: what people have vouched for, and what is badly
-    /// determined.
+    /// Remarks for reports that depend on these calibrations: what users have vouched for, and which records are
+    /// badly determined.
     pub fn remarks(&self) -> Vec<String> {
         let of = |r: Record| {
             let mut said: Vec<String> = r.remarks.iter().map(|said| format!("{}: {said}", r.kind.words())).collect();
@@ -310,15 +312,15 @@ impl Rig {
         self.records().into_iter().flat_map(of).collect()
     }
 
-    /// One hash over the values that turn pixels into points; a scan keeps it, so that a later
-    /// step can tell whether it was taken with the station's present calibration.
+    /// One hash over the values that turn pixels into points. A scan stores it, so that a later step can check
+    /// whether the scan was taken with the station's present calibration.
     pub fn fingerprint(&self) -> String {
         let mut values = serde_json::json!({
             "camera": self.camera.as_ref().map(|c| c.value),
             "laser_plane": self.laser_plane.as_ref().map(|c| c.value),
             "hand_eye": self.hand_eye.as_ref().map(|c| c.value),
         });
-        // Only where they are there: scans of former versions keep their fingerprint.
+        // Included only if present, so that scans of older versions keep their fingerprint.
         let others = [
             ("base_camera", self.base_camera.as_ref().map(|c| serde_json::json!(c.value))),
             ("linear_axis", self.linear_axis.as_ref().map(|c| serde_json::json!(c.value))),
@@ -331,7 +333,7 @@ impl Rig {
     }
 }
 
-/// Refuses what looks like another unit; for values that a person gives.
+/// Refuses values that look like another unit; for values that a user enters.
 pub fn asked(value: &impl Measured) -> Result<()> {
     value.doubt().map_or(Ok(()), |doubt| {
         Err(Fault::refused(doubt)
@@ -348,7 +350,7 @@ fn add<T: Serialize + Measured>(texts: &mut Vec<(Kind, String)>, part: &Option<C
     Ok(())
 }
 
-/// Calibrations that are stored at once; those they replace are kept, their pages are not.
+/// Stores calibrations together; the records that they replace are kept, the replaced pages are not.
 fn together(folder: &Path) -> Together<'_> {
     fn keep_former(folder: &Path, new: &Path) -> std::io::Result<()> {
         for entry in std::fs::read_dir(new)? {

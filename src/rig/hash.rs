@@ -1,4 +1,4 @@
-//! In: text. Out: the hash by which a file is known.
+//! In: text. Out: the hash that identifies a file.
 //! Frame and unit: none.
 
 /// SHA-256 of bytes, hexadecimal.

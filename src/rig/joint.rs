@@ -1,4 +1,4 @@
-//! In: `calibration/joint.json`. Out: the covariance of all records together, and of which records it is.
+//! In: `calibration/joint.json`. Out: the joint covariance of all records, and which records it belongs to.
 //! Frame and unit: as in the records: mm, rad, px.
 
 use super::{Kind, unsealed};
@@ -6,13 +6,13 @@ use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Errors of all records together: which parameter of which record, and their covariance.
+/// Joint covariance of the errors of all records, with the names of the parameters.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JointCovariance {
     /// Version of the file's format: 1.
     pub format: u32,
-    /// What the records hold, as [`super::Calibration::content`] has it: the covariance is of these and no others.
+    /// Hashes of the records' content ([`super::Calibration::content`]): the covariance belongs to exactly these.
     pub of: BTreeMap<Kind, String>,
     /// `record.parameter`, in the order of the matrix.
     pub parameters: Vec<String>,
@@ -20,20 +20,20 @@ pub struct JointCovariance {
     pub matrix: Vec<Vec<f64>>,
 }
 
-/// What a station says of the covariance of its records together.
+/// Joint covariance of a station's records, as loaded.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Joint {
-    /// Nothing: they were calibrated one by one.
+    /// None: the records were calibrated one by one.
     #[default]
     Absent,
-    /// This; whether it is of the rig's records is asked for with [`super::Rig::joint`].
+    /// A stated covariance; [`super::Rig::joint`] checks whether it belongs to the rig's records.
     Stated(JointCovariance),
-    /// Something that cannot be used, and why.
+    /// A file that cannot be used, with the reason.
     Spoilt(String),
 }
 
 impl Joint {
-    /// Of a station. A file that cannot be read spoils nothing else.
+    /// Loads that of a station. A file that cannot be read does not prevent using the records.
     pub(super) fn load(station: &Path) -> Joint {
         let path = station.join("calibration").join("joint.json");
         let text = match crate::files::read_text_if_there(&path) {
@@ -58,8 +58,8 @@ impl JointCovariance {
             && (0..n).all(|i| self.matrix[i][i] >= 0.0)
     }
 
-    /// The first of these records, each with what it holds, that the covariance is not of; a record that is missing
-    /// is none.
+    /// The first of these records (with their content hashes) that the covariance does not belong to. A missing
+    /// record counts as such.
     pub(super) fn other(&self, now: &[(Kind, Option<String>)]) -> Option<Kind> {
         let other =
             |(kind, content): &&(Kind, Option<String>)| content.is_none() || self.of.get(kind) != content.as_ref();

@@ -1,11 +1,11 @@
-//! In: what was calibrated. Out: its names in files and for people, its frame, and the parameters that its covariance
-//! has.
+//! In: what was calibrated. Out: its names in files and in messages, its frame, and the parameters of its
+//! covariance.
 //! Frame and unit: `A_T_b` maps coordinates in frame b to frame A; the unit is part of a parameter's name.
 
 use crate::camera::{ALWAYS_NAMED, NAMES, PARAMETERS};
 use std::collections::BTreeMap;
 
-/// What a calibration is of.
+/// What a calibration describes.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize, strum::IntoStaticStr,
 )]
@@ -20,17 +20,17 @@ pub enum Kind {
     Pointer,
     /// A camera on the flange.
     HandEye,
-    /// A camera that stands still.
+    /// A fixed camera.
     BaseCamera,
     /// A line-profile sensor on the flange.
     ProfileHandEye,
-    /// What moves parts along before the camera, or the camera along parts.
+    /// A linear axis that moves parts before the camera, or the camera along parts.
     LinearAxis,
-    /// What turns parts before the camera.
+    /// A turntable that turns parts before the camera.
     Turntable,
 }
 
-/// The frame, or the transform between two, that a value is in.
+/// The frame of a value, or the transform between two frames that it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Place {
     /// Camera frame.
@@ -50,13 +50,13 @@ pub enum Place {
 /// Units of every calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Units {
-    /// The only ones there are.
+    /// The only supported units.
     #[serde(rename = "mm, rad, px")]
     MmRadPx,
 }
 
 const PLANE: [&str; 4] = ["nx", "ny", "nz", "offset_mm"];
-/// The beam's own, then the camera's: it was found with that camera, and a range needs both.
+/// The beam's own parameters, then the camera's: the beam was found with that camera, and a range needs both.
 const POINTER: [&str; 6 + PARAMETERS] = {
     let mut all = ["ox_mm"; 6 + PARAMETERS];
     let beam = ["ox_mm", "oy_mm", "oz_mm", "dx", "dy", "dz"];
@@ -72,7 +72,7 @@ const TURNTABLE: [&str; 7] = ["dx", "dy", "dz", "pitch_rad", "px_mm", "py_mm", "
 const POSE: [&str; 6] = ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"];
 
 impl Kind {
-    /// Those that a station's scans and ranges are made with.
+    /// The kinds that a station's scans and ranges use.
     pub const OF_A_RIG: [Kind; 7] = [
         Kind::Camera,
         Kind::LaserPlane,
@@ -83,7 +83,7 @@ impl Kind {
         Kind::Turntable,
     ];
 
-    /// In files and their names.
+    /// Name in files and in file names.
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -95,11 +95,11 @@ impl Kind {
             _ => self.words().replace(' ', "-"),
         }
     }
-    /// For people.
+    /// Name in messages.
     pub fn words(self) -> String {
         if self == Kind::HandEye { "hand-eye".into() } else { self.name().replace('_', " ") }
     }
-    /// The frame, or the transform between two, of such a value.
+    /// The frame of such a value, or the transform between two frames that it is.
     pub fn place(self) -> Place {
         match self {
             Kind::Camera | Kind::LaserPlane | Kind::Pointer | Kind::LinearAxis | Kind::Turntable => Place::Camera,
@@ -108,9 +108,9 @@ impl Kind {
             Kind::ProfileHandEye => Place::FlangeFromSensor,
         }
     }
-    /// The covariance's parameters in their order, and how many of the first of them a file may have: a pointer
-    /// (imported, simulated) may be without its camera. Beyond the longest a camera's others may follow, where they
-    /// were estimated.
+    /// The covariance's parameters in their order, and how many of them, counted from the first, a file may have. An
+    /// imported or simulated pointer may lack its camera's. After the longest of these, a camera's further terms may
+    /// follow if they were estimated.
     pub fn parameters(self) -> (&'static [&'static str], &'static [usize]) {
         match self {
             Kind::Camera => (&NAMES, &[ALWAYS_NAMED]),
@@ -121,7 +121,7 @@ impl Kind {
             Kind::Turntable => (&TURNTABLE, &[7]),
         }
     }
-    /// Whether it was measured with the camera, and is of no use with another.
+    /// Whether it was measured with the camera and is useless with another.
     pub fn rests_on_camera(self) -> bool {
         !matches!(self, Kind::Camera | Kind::ProfileHandEye)
     }
@@ -129,7 +129,7 @@ impl Kind {
 
 impl std::str::FromStr for Kind {
     type Err = String;
-    /// The file's name or the command's: `laser_plane`, `laser-plane`.
+    /// Accepts the name in files or that of the command: `laser_plane`, `laser-plane`.
     fn from_str(s: &str) -> Result<Kind, String> {
         let name = s.replace('-', "_");
         let known = BTreeMap::from(Kind::OF_A_RIG.map(|k| (k.name(), k)));

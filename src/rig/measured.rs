@@ -1,13 +1,13 @@
-//! In: nothing. Out: what every calibrated value must be able to say of itself.
-//! Frame and unit: each value's own.
+//! In: nothing. Out: the checks that every calibrated value must provide.
+//! Frame and unit: those of each value.
 
 use crate::fault::Result;
 
 /// A value that can be calibrated.
 pub trait Measured {
-    /// Refuses numbers that no such thing has.
+    /// Refuses numbers that no such value can have.
     fn check(&self) -> Result<()>;
-    /// What would be odd of right numbers: asked about where a person gives them.
+    /// What would be unusual about valid numbers. A user who enters such numbers is asked about it.
     fn doubt(&self) -> Option<String> {
         None
     }

@@ -1,12 +1,12 @@
-//! In: the text of a JSON file. Out: its value, where every object names each of its keys once.
-//! A key that stands twice is refused: serde_json keeps the last one and other programs the first, so that the file
-//! would say two things. Frame and unit: none.
+//! In: the text of a JSON file. Out: its value, in which every object has each key once.
+//! A repeated key is refused: serde_json uses the last one and other programs the first, so the file would be
+//! ambiguous. Frame and unit: none.
 
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 use std::fmt;
 
-/// The value of a JSON text. Errors: no JSON, or a key that stands twice in one object, with line and column.
+/// The value of a JSON text. Errors: invalid JSON, or a key repeated in one object; with line and column.
 pub fn parse(text: &str) -> serde_json::Result<Value> {
     serde_json::from_str::<Once>(text).map(|once| once.0)
 }

@@ -1,16 +1,16 @@
-//! Which camera model belongs to pictures of another size, or another part of the sensor, than the calibrated one.
+//! The camera model for pictures of another size, or of another part of the sensor, than the calibrated one.
 
 use super::Calibration;
 use crate::camera::{Intrinsics, Readout};
 use crate::fault::{Fault, Result};
 
 impl Calibration<Intrinsics> {
-    /// The camera of pictures of this size (columns, rows), and of the part of the sensor that is stated: the
-    /// calibrated one where they are as it was calibrated.
+    /// The camera model for pictures of this size (columns, rows) and of the stated part of the sensor. It is the
+    /// calibrated one if size and part are those of the calibration.
     ///
     /// # Errors
-    /// Another size than the calibrated one, and nobody says what the pictures show; pictures that this camera cannot
-    /// send.
+    /// Another size than the calibrated one without a statement of what the pictures show; pictures that this camera
+    /// cannot send.
     pub fn for_pictures(&self, size: [u32; 2], readout: Option<&Readout>) -> Result<Intrinsics> {
         let (camera, same_size) = (&self.value, size == self.size());
         if let Some(stated) = readout.filter(|r| r.same_view) {
@@ -18,7 +18,7 @@ impl Calibration<Intrinsics> {
         }
         let known = match (self.readout.as_ref(), readout) {
             (Some(known), Some(stated)) if !same_size || !same(known, stated) => *known,
-            // Made before calibrations said what they were made with: of the whole sensor, or of pictures like these.
+            // Made before calibrations recorded their readout: they used the whole sensor, or pictures like these.
             (None, Some(_)) if !same_size => Readout { sensor_px: Some(self.size()), ..Readout::default() },
             (_, None) if !same_size => return Err(self.another(size).next(UNSTATED)),
             _ => return Ok(*camera),
@@ -33,7 +33,7 @@ impl Calibration<Intrinsics> {
         let whole = known.to_whole(camera);
         let (sensor, reach) = (known.sensor_px.or(stated.sensor_px), stated.reach(size));
         let [step, own] = [stated.step(), known.step()].map(|[x, y]| x.max(y));
-        // What is no whole binned pixel is not read.
+        // Columns or rows that do not fill a binned pixel are not read.
         let another =
             stated.sensor_px.zip(sensor).is_some_and(|(a, b)| (0..2).any(|i| a[i].abs_diff(b[i]) >= step.max(own)));
         if another || sensor.is_some_and(|[w, h]| reach[0] > u64::from(w) || reach[1] > u64::from(h)) {
@@ -45,7 +45,7 @@ impl Calibration<Intrinsics> {
         Ok(stated.of_whole(&whole, size))
     }
 
-    /// The camera of pictures that show the calibrated view at another resolution.
+    /// The camera model for pictures that show the calibrated view at another resolution.
     fn rescaled(&self, [w, h]: [u32; 2], stated: &Readout) -> Result<Intrinsics> {
         if *stated != (Readout { same_view: true, ..Readout::default() }) {
             return Err(Fault::input(format!("the readout contradicts itself: {stated}"))
@@ -64,7 +64,8 @@ impl Calibration<Intrinsics> {
         Ok(self.value.scaled_to(w, h))
     }
 
-    /// Refuses pictures that are not as the camera was calibrated: of work that goes with the calibrated camera only.
+    /// Refuses pictures that differ from those of the calibration, for work that needs the calibrated camera
+    /// unchanged.
     ///
     /// # Errors
     /// Another size, another part of the sensor.
@@ -90,7 +91,7 @@ impl Calibration<Intrinsics> {
 const UNSTATED: &str = "say what the pictures show: --region X,Y, --binned N or --same-view, or 'readout' in meta.json \
      (docs/file-formats.md); or record with the settings that the camera was calibrated with";
 
-/// Two statements of one and the same setting.
+/// Whether two statements describe the same setting.
 fn same(a: &Readout, b: &Readout) -> bool {
     Readout { sensor_px: None, ..*a } == Readout { sensor_px: None, ..*b }
         && a.sensor_px.zip(b.sensor_px).is_none_or(|(a, b)| a == b)
@@ -130,7 +131,7 @@ mod tests {
     fn a_size_that_nobody_explains_is_refused() {
         for camera in [calibrated(None), calibrated(Some(Readout::default()))] {
             assert_eq!(camera.for_pictures([640, 480], None).unwrap(), camera.value);
-            // The aspect of the calibrated size, half of it, and another one.
+            // Sizes with the aspect of the calibrated size and with another one.
             for size in [[320, 240], [640, 240], [1280, 960]] {
                 let said = camera.for_pictures(size, None).unwrap_err();
                 assert!(said.what.contains("640x480") && said.next.contains("--region"), "{said}");
@@ -186,7 +187,7 @@ mod tests {
         assert_eq!(camera.for_pictures([640, 480], Some(&region(320, 240))).unwrap(), camera.value);
         let whole = Readout { sensor_px: Some([1280, 960]), ..Readout::default() };
         assert_eq!(camera.for_pictures([1280, 960], Some(&whole)).unwrap().cx, 640.0);
-        // One that does not say so is taken for one of pictures like these.
+        // A calibration that does not state its readout is assumed to be of pictures like these.
         assert_eq!(calibrated(None).for_pictures([640, 480], Some(&moved)).unwrap().cx, 320.0);
     }
 }

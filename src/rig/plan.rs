@@ -1,40 +1,43 @@
-//! What a planned rig will resolve, from the data sheets of camera, lens and laser (docs/hardware.md). Lengths in mm.
+//! The resolution of a planned rig, from the data sheets of camera, lens and laser (docs/hardware.md). Lengths in
+//! mm.
 
 use crate::fault::{Fault, Result};
 
-/// A camera that looks squarely at the parts, and a laser sheet that crosses its axis at the working distance.
+/// A camera that looks squarely at the parts, and a laser sheet that crosses the camera's axis at the working
+/// distance.
 #[derive(Clone, Copy, Debug)]
 pub struct RigPlan {
-    /// Picture, px; the first number is along the stripe.
+    /// Size of the picture, px; the first number is along the stripe.
     pub pixels: [u32; 2],
     /// Edge of a pixel, µm.
     pub pixel_um: f64,
     /// Focal length, mm.
     pub focal_mm: f64,
-    /// From the projection centre to the parts, mm.
+    /// Distance from the projection centre to the parts, mm.
     pub distance_mm: f64,
-    /// Between the camera's axis and the laser sheet, degrees.
+    /// Angle between the camera's axis and the laser sheet, degrees.
     pub angle_deg: f64,
     /// f-number of the lens.
     pub f_number: f64,
 }
 
-/// What a [`RigPlan`] resolves.
+/// The predicted resolution of a [`RigPlan`].
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct RigForecast {
-    /// Width of the parts that a pixel sees, mm.
+    /// Width on the parts that a pixel covers, mm.
     pub pixel_mm: f64,
-    /// What the picture sees at the working distance, mm.
+    /// Field of view at the working distance, mm.
     pub view_mm: [f64; 2],
     /// Change of depth that moves the stripe by a pixel, for a surface square to the camera, mm.
     pub depth_per_pixel_mm: f64,
-    /// Scatter of a point on a clean stripe, mm: from a centre found to 0.02 px to one found to 0.05 px.
+    /// Scatter of a point on a clean stripe, mm, for stripe centres found to 0.02 px and to 0.05 px.
     pub scatter_mm: [f64; 2],
-    /// Nearest and farthest distance at which the stripe is in the picture, mm; `None`: however far.
+    /// Nearest and farthest distance at which the stripe is in the picture, mm; `None`: no farthest distance.
     pub stripe_mm: (f64, Option<f64>),
-    /// Nearest and farthest distance at which a point is blurred by less than a pixel, mm; `None`: however far.
+    /// Nearest and farthest distance at which a point is blurred by less than a pixel, mm; `None`: no farthest
+    /// distance.
     pub sharp_mm: (f64, Option<f64>),
-    /// What stays dark behind a step of 1 mm, mm.
+    /// Length of the shadow behind a step of 1 mm, mm.
     pub shadow_mm: f64,
 }
 
@@ -98,8 +101,8 @@ mod tests {
         f_number: 8.0,
     };
 
-    /// Where a point of the sheet at depth z appears, px from the picture's middle, by the ray and the plane
-    /// themselves.
+    /// Row of a point of the sheet at depth z, px from the picture's middle, computed directly from the ray and the
+    /// plane.
     fn row(plan: &RigPlan, z: f64) -> f64 {
         let aside = (plan.distance_mm - z) * plan.angle_deg.to_radians().tan();
         aside / z * plan.focal_mm / (plan.pixel_um / 1000.0)
@@ -109,7 +112,7 @@ mod tests {
     fn the_forecast_is_what_ray_and_plane_give() {
         let found = GUIDE.forecast().unwrap();
         assert!((found.pixel_mm - 0.253).abs() < 5e-4 && (found.view_mm[0] - 162.1).abs() < 0.1, "{found:?}");
-        // A small step of the surface moves the stripe by as much as stated.
+        // A small step of the surface moves the stripe by the predicted amount.
         let step = 1e-3;
         let moved = row(&GUIDE, GUIDE.distance_mm - step) - row(&GUIDE, GUIDE.distance_mm);
         assert!((step / moved - found.depth_per_pixel_mm).abs() < 1e-4, "{found:?}");
@@ -123,7 +126,8 @@ mod tests {
         let plan = RigPlan { focal_mm: 50.0, distance_mm: 400.0, f_number: 4.0, ..GUIDE };
         let found = plan.forecast().unwrap();
         for z in [found.sharp_mm.0, found.sharp_mm.1.unwrap()] {
-            // Thin lens: the picture of depth z lies at v, the sensor at v0; the aperture f / N makes a cone.
+            // Thin lens: the image of depth z lies at v, the sensor at v0; the aperture f / N defines the cone of
+            // light.
             let image = |z: f64| 1.0 / (1.0 / plan.focal_mm - 1.0 / z);
             let (v, v0) = (image(z), image(plan.distance_mm));
             let blur = plan.focal_mm / plan.f_number * (v - v0).abs() / v;

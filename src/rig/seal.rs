@@ -1,12 +1,12 @@
-//! In: a record that the program writes and must find unchanged. Out: its JSON with a SHA-256 of all the rest in
-//! `seal`, and the record back from it. A seal tells of edits and damage; it is no signature.
+//! In: a record that the program writes and must find unchanged. Out: its JSON with a SHA-256 of everything else in
+//! `seal`, and the record read back from it. A seal reveals edits and damage; it is no signature.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value;
 
-/// Pretty JSON of a record that is an object, with its seal.
+/// Pretty JSON of a record, which must be an object, with its seal.
 pub fn sealed(record: &impl Serialize) -> String {
     let mut value = serde_json::to_value(record).expect("plain data");
     let seal = seal_of(&value);
@@ -14,15 +14,15 @@ pub fn sealed(record: &impl Serialize) -> String {
     serde_json::to_string_pretty(&value).expect("plain data")
 }
 
-/// SHA-256 of the value in its one compact form: keys sorted, numbers as short as they come back.
+/// SHA-256 of the value in its unique compact form: keys sorted, numbers in their shortest exact form.
 fn seal_of(value: &Value) -> String {
     super::hash_text(value.to_string().as_bytes())
 }
 
-/// For files of which the caller says no more.
+/// Default advice, for files whose caller gives none.
 const AGAIN: &str = "make it again, or restore the previous one";
 
-/// The record of a file whose seal is whole. `what` says what the file should be.
+/// The record of a file with a valid seal. `what` names the expected file in messages.
 pub fn unsealed<T: DeserializeOwned>(text: &str, what: &str) -> Result<T> {
     let (value, seal) = apart(text, what)?;
     let Some(seal) = seal else {
@@ -78,13 +78,13 @@ mod tests {
         let record = Some { x: vec![0.1 + 0.2, -0.0, 1e300, 1.0 / 3.0], name: "ä".into(), n: u64::MAX };
         let text = sealed(&record);
         assert_eq!(unsealed::<Some>(&text, "it").unwrap(), record);
-        // White space is no content; any digit or letter is.
+        // White space does not count as content; every digit and letter does.
         assert!(unsealed::<Some>(&text.replace("\n", ""), "it").is_ok());
         let mut seen = 0;
         for (i, c) in text.char_indices().filter(|(_, c)| c.is_ascii_alphanumeric()) {
             let other = if c.is_ascii_digit() { if c == '7' { '8' } else { '7' } } else { '_' };
             let edited = format!("{}{other}{}", &text[..i], &text[i + 1..]);
-            // The last digit of a number can be another and the number the same.
+            // Changing the last digit of a number may leave its value unchanged.
             if serde_json::from_str::<Value>(&edited).is_ok_and(|v| v == serde_json::from_str::<Value>(&text).unwrap())
             {
                 continue;

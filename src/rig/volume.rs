@@ -1,14 +1,14 @@
-//! In: nearest and farthest depth, and who stated them. Out: the range in which a rig works or is judged, as messages
-//! name it.
-//! Frame and unit: along the camera's optical axis (of a profile sensor: its z), mm.
+//! In: nearest and farthest depth, and who stated them. Out: the range in which a rig works or is judged, with its
+//! wording in messages.
+//! Frame and unit: along the camera's optical axis (for a profile sensor its z), mm.
 
-/// A range of depths with its origin: no range is a number of the program's own.
+/// A range of depths with its origin: the program never assumes a range.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Volume {
-    /// Nearest depth.
+    /// Nearest depth, mm.
     pub near_mm: f64,
-    /// Farthest depth.
+    /// Farthest depth, mm.
     pub far_mm: f64,
     /// Who stated it, in words: "station.toml", "where the boards stood".
     pub from: String,
@@ -19,13 +19,13 @@ impl Volume {
     pub fn new(near_mm: f64, far_mm: f64, from: &str) -> Volume {
         Volume { near_mm, far_mm, from: from.into() }
     }
-    /// What some depths span; `None` without a depth.
+    /// The range that some depths span; `None` without a depth.
     pub fn spanned(depths: impl Iterator<Item = f64>, from: &str) -> Option<Volume> {
         let (near, far) =
             depths.filter(|z| z.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), z| (a.min(z), b.max(z)));
         (near <= far).then(|| Volume::new(near, far, from))
     }
-    /// The depths themselves; every one where nobody stated any.
+    /// The two depths; if no volume is stated, all depths from 0 to infinity.
     pub fn depths(volume: Option<&Volume>) -> [f64; 2] {
         volume.map_or([0.0, f64::INFINITY], |v| [v.near_mm, v.far_mm])
     }
@@ -33,21 +33,21 @@ impl Volume {
     pub fn middle(&self) -> f64 {
         (self.near_mm + self.far_mm) / 2.0
     }
-    /// From the nearest depth to the farthest, mm.
+    /// Distance from the nearest depth to the farthest, mm.
     pub fn length(&self) -> f64 {
         self.far_mm - self.near_mm
     }
-    /// The same with its own length added at both ends, never nearer than half of the nearest depth.
+    /// The same range extended by its length at both ends, but not nearer than half of the nearest depth.
     pub fn extended(&self) -> Volume {
         let near = f64::max(self.near_mm - self.length(), self.near_mm / 2.0);
         let from = format!("{} and as far again to both sides", self.from);
         Volume { near_mm: near, far_mm: self.far_mm + self.length(), from }
     }
-    /// The two depths in words, with as many digits as tell them apart.
+    /// The two depths in words, with enough digits to distinguish them.
     pub fn words(&self) -> String {
         format!("{} to {} mm", self.depth(self.near_mm), self.depth(self.far_mm))
     }
-    /// One depth of this range, with as many digits as tell the range's ends apart.
+    /// One depth of this range, with enough digits to distinguish the range's ends.
     pub fn depth(&self, mm: f64) -> String {
         let length = if self.length() > 0.0 { self.length() } else { mm.abs().max(1.0) };
         let digits = (2.0 - length.log10()).ceil().clamp(0.0, 4.0) as usize;

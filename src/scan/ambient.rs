@@ -1,18 +1,20 @@
-//! In: one picture with the laser off. Out: shots without that light, and a refusal where it cannot have been taken
-//! as the shots were. Frame and unit: grey levels of the shots' depth. The rule is that of the stage `ambient`.
+//! In: one picture taken with the laser off. Out: shots with that ambient light subtracted; a picture that cannot
+//! have been taken with the shots' settings is refused. Frame and unit: grey levels at the shots' depth. The rule is
+//! that of the stage `ambient`.
 
 use super::Format;
 use crate::fault::{Fault, Result};
 use crate::raster::{Image, Pixels};
 
-/// Grey levels (8 bits) by which a pixel of the ambient picture may exceed that of a shot: noise, and a robot that
-/// moved on under a leak of room light.
+/// Grey levels (8 bits) by which a pixel of the ambient picture may exceed that of a shot. It allows for noise and
+/// for a robot that moved under uneven room light.
 const SPARE: u32 = 8;
-/// Share of a shot's pixels that may be darker than that. With one exposure hardly any is; of a picture exposed for
-/// room light, which would eat the stripe, most are.
+/// Share of a shot's pixels that may be darker than the ambient picture by more than `SPARE`. With equal exposure
+/// hardly any pixel is. Most are if the ambient picture was exposed for room light, and subtracting it would remove
+/// the stripe.
 const DARKER: f64 = 0.1;
 
-/// Light that is in every shot.
+/// Ambient light that is present in every shot.
 #[derive(Clone, Debug)]
 pub struct Ambient {
     /// One picture with the laser off, of the shots' size and depth; grey levels.
@@ -20,7 +22,7 @@ pub struct Ambient {
 }
 
 impl Ambient {
-    /// Refused: another size or depth than the shots'.
+    /// Refuses a picture whose size or depth differs from the shots'.
     pub fn new(image: Image, format: Format) -> Result<Ambient> {
         let is = Format { width: image.width, height: image.height, bits: image.bits };
         if is != format {
@@ -32,7 +34,7 @@ impl Ambient {
         Ok(Ambient { image })
     }
 
-    /// Refuses a picture that is brighter than the shot in much of it.
+    /// Refuses an ambient picture that is brighter than the shot over a large share of its pixels.
     pub fn suits(&self, shot: &Image, name: &str) -> Result<()> {
         let spare = SPARE << (shot.bits - 8);
         let darker = match (&self.image.pixels, &shot.pixels) {

@@ -1,5 +1,5 @@
-//! In: a running camera's pictures, paired with what moves; straight, or as a recorder hands them on. Out: a source
-//! of shots.
+//! In: a running camera's pictures, paired with what moves; taken directly from the stream, or from a recorder that
+//! hands them on. Out: a source of shots.
 //! Frame and unit: as [`super::Shot`].
 
 use super::source::{BadShot, Shot, Source};
@@ -11,12 +11,12 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Who is told what happens while a source is read: the stream, and what a person should hear.
+/// Called while a source is read: with the stream's state, and with a message for the user if there is one.
 pub type Say = Box<dyn FnMut(&Stream, Option<String>)>;
 
 const GLANCE: Duration = Duration::from_millis(200);
 
-/// A stream as a source. Nothing of it is kept.
+/// A stream as a source. Its pictures are not stored.
 pub struct StreamSource {
     stream: Stream,
     say: Say,
@@ -25,7 +25,7 @@ pub struct StreamSource {
 }
 
 impl StreamSource {
-    /// Scans what a stream gives.
+    /// Scans the pictures that a stream delivers.
     pub fn new(stream: Stream, say: Say) -> StreamSource {
         StreamSource { stream, say, next: 0, ended: false }
     }
@@ -91,20 +91,21 @@ impl Source for StreamSource {
     }
 }
 
-/// What a recorder on another thread hands on, scanned while it goes on recording. Shots that have to wait are read
-/// from its disk again.
+/// Scans what a recorder on another thread hands on, while it goes on recording. Shots that have to wait are read
+/// back from the recorder's disk.
 pub struct RecordedSource {
     format: Format,
     recording: Recording,
     backlog: Backlog,
     frames: Option<FollowedFrames>,
     next: usize,
-    /// What the recording came to, once it has ended.
+    /// Result of the recording, set once the recording has ended.
     report: Arc<Mutex<Option<Result<RecordReport>>>>,
 }
 
 impl RecordedSource {
-    /// `meta` is what the recorder writes into `folder`; `report` is filled before the backlog's other end is dropped.
+    /// `meta` is what the recorder writes into `folder`; `report` is set before the backlog's sending end is
+    /// dropped.
     pub fn new(
         folder: PathBuf,
         meta: crate::recording::Meta,
@@ -116,7 +117,7 @@ impl RecordedSource {
         RecordedSource { format, recording, backlog, frames: None, next: 0, report }
     }
 
-    /// A shot as the recorder wrote it.
+    /// Reads a shot as the recorder wrote it.
     fn read(&mut self, index: usize) -> Result<Recorded> {
         let frames = match &mut self.frames {
             Some(frames) => frames,

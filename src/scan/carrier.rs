@@ -1,6 +1,7 @@
-//! In: a rig, what moves the part past the light, and where that stood at a shot. Out: how the camera stood to the
-//! part, and how far that is uncertain.
-//! Frame and unit: the cloud's frame ([`Motion::frame`]: base, flange of a robot that carries the part, axis); mm, rad.
+//! In: a rig, the motion that moves the part past the light, and its position at a shot. Out: the pose of the camera
+//! relative to the part, with its uncertainty.
+//! Frame and unit: the cloud's frame ([`Motion::frame`]: base, flange of a robot that carries the part, axis); mm,
+//! rad.
 
 use crate::fault::{Fault, Result};
 use crate::geometry::{Axis, AxisKind, Base, Camera, Ride, Rigid, Twist, Vec3};
@@ -8,25 +9,25 @@ use crate::recording::{Carries, Motion, Slip, Stand};
 use crate::rig::{HandEye, Rig, axis_sigma};
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
-/// How the camera stood to the part.
+/// Pose of the camera relative to the part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// Camera frame to the cloud's frame, for which `Base` stands whatever moved; mm.
+    /// Camera frame to the cloud's frame, mm. The type says `Base` for the cloud's frame, whatever moves.
     pub from_camera: Rigid<Base, Camera>,
-    /// Of a motion (v, w) of the cloud's points, mm and rad: the axis', and speed times what is not known of the
-    /// time. `None`: the robot's share and the hand-eye's are in the budget of what is found, where all points of a
-    /// part share them.
+    /// Covariance of a motion (v, w) of the cloud's points, mm and rad: the axis' share, and speed times the
+    /// uncertainty of the time. `None`: the uncertainties of the robot and of the hand-eye are in the budget of the
+    /// result, because all points of a part share them.
     pub covariance: Option<Matrix6<f64>>,
 }
 
 impl Place {
-    /// The cloud's frame is the camera's.
+    /// The cloud's frame is the camera frame.
     pub fn camera() -> Place {
         Place { from_camera: Rigid::identity(), covariance: None }
     }
 }
 
-/// Turns where the motion stood into where the camera was.
+/// Converts the position of the motion into the pose of the camera.
 #[derive(Clone, Debug)]
 pub struct Carrier {
     way: Way,
@@ -34,9 +35,9 @@ pub struct Carrier {
 
 #[derive(Clone, Debug)]
 enum Way {
-    /// The camera on the flange.
+    /// The camera is on the flange.
     Sensor(HandEye),
-    /// The part on the flange, the camera in the base.
+    /// The part is on the flange, the camera is fixed in the base.
     Part(Rigid<Base, Camera>),
     Axis(Box<OnAxis>),
 }
@@ -44,16 +45,17 @@ enum Way {
 #[derive(Clone, Debug)]
 struct OnAxis {
     axis: Axis,
-    /// Of dx dy dz pitch px py pz.
+    /// Covariance of dx dy dz pitch px py pz.
     covariance: DMatrix<f64>,
-    /// What the axis scatters by from stop to stop, mm and rad.
+    /// Scatter of the axis from stop to stop, mm and rad.
     sigma: [f64; 2],
 }
 
-/// Farther than this from where the axis frame stands, mm, single precision spoils the points: 0.002 mm at 30 m.
+/// Farthest position from the axis frame's origin, mm. Beyond it single precision spoils the points: 0.002 mm at 30
+/// m.
 const FARTHEST: f64 = 3e4;
 
-/// The parts of a rig that scans of such a motion rest on.
+/// The parts of a rig that a scan with this motion depends on.
 pub fn parts_for(rig: &Rig, motion: &Motion) -> Rig {
     let robot = |carries| motion.axis().is_none() && motion.carries == carries;
     Rig {
@@ -67,8 +69,8 @@ pub fn parts_for(rig: &Rig, motion: &Motion) -> Rig {
 }
 
 impl Carrier {
-    /// Refused: a rig that lacks what the motion needs (hand-eye, base camera or axis), counts of another unit than
-    /// the axis was calibrated in.
+    /// Refuses a rig that lacks what the motion needs (hand-eye, base camera or axis), and counts of another unit
+    /// than that of the axis calibration.
     pub fn new(rig: &Rig, motion: &Motion) -> Result<Carrier> {
         let way = match (motion.axis(), motion.carries) {
             (None, Carries::Sensor) => Way::Sensor(rig.need_hand_eye()?.value),
@@ -93,13 +95,13 @@ impl Carrier {
         Ok(Carrier { way })
     }
 
-    /// Whether places of the light move by different lengths from shot to shot.
+    /// Whether the points of the laser sheet move by different lengths from shot to shot.
     pub fn turns(&self) -> bool {
         matches!(&self.way, Way::Axis(on) if on.axis.kind == AxisKind::Turntable)
     }
 
-    /// `slip`: how far the stand may be off; `anchor`: where the light meets the part, camera frame, mm; an axis'
-    /// turns from stop to stop are about it.
+    /// `slip` is how far the stated position may be off. `anchor` is where the light meets the part, camera frame,
+    /// mm; the axis' rotation errors from stop to stop are taken about it.
     pub fn place(&self, stand: &Stand, slip: Option<&Slip>, anchor: &Vec3) -> Result<Place> {
         let mut place = self.stood(stand, anchor)?;
         if let Some(Twist { v, w }) = slip.and_then(|s| self.moved(stand, s)) {
@@ -109,13 +111,13 @@ impl Carrier {
         Ok(place)
     }
 
-    /// The motion of the cloud's points, in its frame, that a slip is.
+    /// The motion of the cloud's points, in the cloud's frame, that a slip causes.
     fn moved(&self, stand: &Stand, slip: &Slip) -> Option<Twist> {
         match (&self.way, stand, slip) {
             (Way::Sensor(_), _, Slip::Flange([x, y, z, a, b, c])) => {
                 Some(Twist { v: Vec3::new(*x, *y, *z), w: Vec3::new(*a, *b, *c) })
             }
-            // Seen from the flange the world moves the other way.
+            // Seen from the flange, the world moves in the opposite direction.
             (Way::Part(_), Stand::Robot(base_from_flange), Slip::Flange([x, y, z, a, b, c])) => {
                 let (v, w) = (Vec3::new(*x, *y, *z), Vec3::new(*a, *b, *c));
                 let at_flange = v + w.cross(&base_from_flange.translation);
@@ -140,7 +142,7 @@ impl Carrier {
             }
             (Way::Part(base_from_camera), Stand::Robot(base_from_flange)) => {
                 let flange_from_camera = base_from_flange.inverse() * *base_from_camera;
-                // The cloud's frame is the flange's: `Base` names where clouds live.
+                // The cloud's frame is the flange's: the type `Base` stands for the cloud's frame.
                 let from_camera = Rigid::new(flange_from_camera.rotation, flange_from_camera.translation);
                 Ok(Place { from_camera, covariance: None })
             }
@@ -172,7 +174,7 @@ impl OnAxis {
         let [mm, rad] = self.sigma.map(|s| s * s);
         let lever = Twist::lever(&at.point(anchor));
         let turns = lever.fixed_view::<3, 3>(0, 3).into_owned() * -1.0;
-        // A turn w about the anchor is v = anchor x w, w.
+        // A rotation w about the anchor is the twist (anchor x w, w).
         covariance += block(Matrix3::identity() * mm + turns * turns.transpose() * rad, turns * rad, rad);
         Ok(Place { from_camera: Rigid::new(at.rotation, at.translation), covariance: Some(covariance) })
     }
@@ -188,7 +190,7 @@ fn block(vv: Matrix3<f64>, vw: Matrix3<f64>, rad: f64) -> Matrix6<f64> {
 }
 
 impl Place {
-    /// Variance that the place adds to a point of the cloud along its worst direction, mm².
+    /// Variance that the pose adds to a point of the cloud along its worst direction, mm².
     pub fn variance_at(&self, p: &Vec3) -> f64 {
         let Some(c) = &self.covariance else { return 0.0 };
         let lever = Twist::lever(p);
@@ -238,7 +240,7 @@ mod tests {
         };
         assert!((at(0.0) - 0.03).abs() < 1e-12);
         assert!((at(50_000.0) - 0.03f64.hypot(0.05)).abs() < 1e-9, "{}", at(50_000.0));
-        // 50 mm from a turntable's axis 1e-6 rad a count.
+        // 50 mm from a turntable's axis, 1e-6 rad a count.
         let table = Carrier::new(&rig(AxisKind::Turntable, 0.0), &motion(MotionKind::Turntable)).unwrap();
         let place = table.place(&Stand::Count(300.0), None, &anchor).unwrap();
         assert!((place.variance_at(&Vec3::new(30.0, 40.0, 9.0)).sqrt() - 50.0 * 300.0 * 1e-6).abs() < 1e-9);
@@ -279,7 +281,8 @@ mod tests {
         let on_part = Vec3::new(3.0, 4.0, 5.0);
         let seen = base_from_camera.inverse().point(&flange.point(&on_part));
         assert!((place.from_camera.point(&seen) - on_part).norm() < 1e-9);
-        // A robot that stood a little farther on its way: the point lies elsewhere on the part by what its sigma says.
+        // The robot stood a little farther on its path: the point lies elsewhere on the part, by the distance that
+        // its sigma states.
         let (v, w) = (Vec3::new(0.03, 0.0, 0.02), Vec3::new(0.0, 4e-4, 1e-4));
         let slip = Slip::Flange([v.x, v.y, v.z, w.x, w.y, w.z]);
         let place = carrier.place(&Stand::Robot(flange), Some(&slip), &Vec3::zeros()).unwrap();

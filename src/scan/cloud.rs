@@ -1,6 +1,7 @@
-//! In: points as they leave the scanner, shot by shot. Out: a binary PLY that grows on disk, can be
-//! resumed after a crash, and gets its final name only when it is complete; and the way back.
+//! In: points as they leave the scanner, shot by shot. Out: a binary PLY that grows on disk, can be resumed after a
+//! crash, and gets its final name only when it is complete. Such a file can be read again.
 //! Frame and unit: the frame that the header names, mostly the robot's base, mm; (u, v) in pixels of the shot; byte
+//! layout in docs/file-formats.md.
 //! layout in docs/file-formats.md.
 
 use crate::fault::{Fault, Result};
@@ -10,36 +11,36 @@ use std::fs::File;
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// One measured point. The layout is the PLY's record, little endian.
+/// One measured point. Its memory layout is that of the PLY's record, little endian.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct CloudPoint {
-    /// The cloud's frame, mm.
+    /// Position in the cloud's frame, mm.
     pub position: glam::Vec3,
     /// Standard deviation of the position along its worst direction, mm.
     pub sigma_mm: f32,
     /// Stripe amplitude, grey levels of the recording's depth.
     pub intensity: f32,
-    /// 0 (barely believed) to 1.
+    /// Quality from 0 (barely credible) to 1.
     pub quality: f32,
     /// Index of the shot in the recording.
     pub shot: u32,
-    /// Sub-pixel place of the peak in that shot, px.
+    /// Sub-pixel column of the peak in that shot, px.
     pub u: f32,
-    /// Its place down the rows of that shot, px.
+    /// Sub-pixel row of the peak in that shot, px.
     pub v: f32,
 }
 
-// Points are read and written as they lie in memory, and the file is little endian.
+// Points are read and written with their memory layout, and the file is little endian.
 const _: () = assert!(cfg!(target_endian = "little"), "clouds are read and written on little-endian machines only");
 
 impl CloudPoint {
-    /// Where it lies, the cloud's frame, mm.
+    /// Its position in the cloud's frame, mm.
     pub fn at(&self) -> Vec3 {
         Vec3::from(self.position.as_dvec3().to_array())
     }
 
-    /// The same point elsewhere.
+    /// The same point at another position.
     pub fn moved_to(self, at: Vec3) -> CloudPoint {
         CloudPoint { position: glam::DVec3::from_array(at.into()).as_vec3(), ..self }
     }
@@ -62,11 +63,11 @@ const PROPERTIES: [(&str, &str); 9] = [
 /// Points read or written at a time: 2.3 MB.
 const CHUNK: usize = 1 << 16;
 
-/// Frames that clouds are in: [`crate::recording::Motion::frame`], and that of an imported map.
+/// Frames that a cloud may be in: those of [`crate::recording::Motion::frame`], and that of an imported map.
 const FRAMES: [&str; 4] = ["base", "axis", "flange", "map"];
 
 fn header(count: u64, frame: &str) -> String {
-    // Leading zeros, not spaces: every PLY reader takes them as a number.
+    // Leading zeros, not spaces: every PLY reader parses them as part of a number.
     let mut text = format!("ply\nformat binary_little_endian 1.0\ncomment sheetlight cloud, {frame} frame, mm\n");
     text += &format!("element vertex {count:0COUNT_DIGITS$}\n");
     for (kind, name) in PROPERTIES {
@@ -75,7 +76,7 @@ fn header(count: u64, frame: &str) -> String {
     text + "end_header\n"
 }
 
-/// Anything that can hand out its points in chunks, more than once.
+/// Any source that can hand out its points in chunks, more than once.
 pub trait PointSource {
     /// Calls `take` with every point, in order, in chunks of any size.
     fn for_each_chunk(&self, take: &mut dyn FnMut(&[CloudPoint])) -> Result<()>;
@@ -108,11 +109,11 @@ impl CloudWriter {
         CloudWriter::create_in(path, FRAMES[0])
     }
 
-    /// The same for points in another frame than the robot's base.
+    /// As [`CloudWriter::create`], for points in another frame than the robot's base.
     pub fn create_in(path: &Path, frame: &'static str) -> Result<CloudWriter> {
         debug_assert!(FRAMES.contains(&frame), "{frame}");
         let part = part_of(path);
-        // Anew, so that a link of that name leads nowhere.
+        // Created anew, so that an existing link of that name is not followed.
         let file = remove(&part).and_then(|()| File::options().write(true).create_new(true).open(&part));
         let file = file.map_err(|e| Fault::write(&part, e))?;
         let out = BufWriter::with_capacity(1 << 20, file);
@@ -121,20 +122,20 @@ impl CloudWriter {
         Ok(writer)
     }
 
-    /// Continues an unfinished cloud after its first `keep` points, as [`CloudWriter::checkpoint`]
-    /// returned them; what came after is cut off.
+    /// Continues an unfinished cloud after its first `keep` points, the count that [`CloudWriter::checkpoint`]
+    /// returned. Later points are cut off.
     pub fn resume(path: &Path, keep: u64) -> Result<CloudWriter> {
         let part = part_of(path);
-        // Stopped between its name and the files that are made from it.
+        // The scan stopped after the cloud got its final name, before the files that are made from it were written.
         if path.exists() && !part.exists() {
             moment().and_then(|()| std::fs::rename(path, &part)).map_err(|e| Fault::write(&part, e))?;
         }
         let mut file = File::options().read(true).write(true).open(&part).map_err(|e| Fault::read(&part, e))?;
-        // Its count may be in it already.
+        // The header may hold the final count already.
         let head = head_of(&mut file).map_err(|e| Fault::read(&part, e))?;
         let length = file.metadata().map_err(|e| Fault::read(&part, e))?.len();
         let (frame, start) = head.as_ref().map_or((FRAMES[0], 0), |h| (h.frame, h.length));
-        // A count that no file holds is a length that none has.
+        // Saturating: a count that no file can hold gives a length that no file has.
         let wanted = keep.saturating_mul(RECORD).saturating_add(start);
         if head.is_none() || length < wanted {
             return Err(Fault::input(format!("{}: has {length} bytes, {wanted} needed to resume", part.display()))
@@ -153,7 +154,7 @@ impl CloudWriter {
     /// Adds points at the end.
     ///
     /// # Errors
-    /// A write that fails; what [`CloudWriter::checkpoint`] returned can still be resumed.
+    /// A write that fails. The points up to the last [`CloudWriter::checkpoint`] can still be resumed.
     pub fn append(&mut self, points: &[CloudPoint]) -> Result<()> {
         self.put(bytemuck::cast_slice(points))?;
         self.count += points.len() as u64;
@@ -165,14 +166,14 @@ impl CloudWriter {
         self.count
     }
 
-    /// Puts everything on the disk; the returned count is what [`CloudWriter::resume`] can keep.
+    /// Syncs everything to the disk; the returned count is what [`CloudWriter::resume`] can keep.
     pub fn checkpoint(&mut self) -> Result<u64> {
         let done = moment().and_then(|()| self.out.flush()).and_then(|()| self.out.get_ref().sync_data());
         done.map_err(|e| Fault::write(&part_of(&self.path), e))?;
         Ok(self.count)
     }
 
-    /// Writes the count into the header, syncs, and gives the file its name.
+    /// Writes the count into the header, syncs, and gives the file its final name.
     pub fn finish(mut self) -> Result<u64> {
         let part = part_of(&self.path);
         let done = moment()
@@ -188,7 +189,7 @@ impl CloudWriter {
     }
 }
 
-/// The header of this program's clouds.
+/// The header of a cloud that this program wrote.
 struct Head {
     frame: &'static str,
     count: u64,
@@ -196,7 +197,7 @@ struct Head {
     length: u64,
 }
 
-/// None where the file begins otherwise.
+/// `None` if the file does not begin with such a header.
 fn head_of(file: &mut File) -> std::io::Result<Option<Head>> {
     let longest = FRAMES.iter().map(|f| header(0, f).len()).max().unwrap_or(0);
     let mut bytes = Vec::with_capacity(longest);
@@ -207,7 +208,7 @@ fn head_of(file: &mut File) -> std::io::Result<Option<Head>> {
     }))
 }
 
-/// The count in a header of this program's; none in any other.
+/// The count in a header that this program wrote; `None` for any other header.
 fn count_in(head: &[u8], frame: &str) -> Option<u64> {
     let text = std::str::from_utf8(head).ok()?;
     let count = text.lines().find_map(|l| l.strip_prefix("element vertex "))?.parse().ok()?;
@@ -227,7 +228,7 @@ pub fn write_cloud(path: &Path, points: &[CloudPoint]) -> Result<()> {
     out.finish().map(|_| ())
 }
 
-/// A finished cloud on disk; points are streamed, never all held.
+/// A finished cloud on disk. Points are streamed; they are never all in memory.
 #[derive(Clone, Debug)]
 pub struct CloudFile {
     path: PathBuf,
@@ -352,7 +353,7 @@ mod tests {
         writer.append(&points[30..]).unwrap();
         assert_eq!(writer.finish().unwrap(), 50);
         assert_eq!(read_cloud(&path).unwrap(), points);
-        // Stopped after it had its name, it goes on as the unfinished one that it was.
+        // A scan that stopped after the cloud got its final name resumes it as an unfinished cloud.
         drop(CloudWriter::resume(&path, 20).unwrap());
         assert!(!path.exists());
         let mut writer = CloudWriter::resume(&path, 20).unwrap();

@@ -1,5 +1,5 @@
-//! In: pictures in order with their poses. Out: their peaks, chosen, and their points, in the same order; on the GPU
-//! or on this machine's processor, with the same results.
+//! In: pictures in order with their poses. Out: their peaks, each accepted or rejected, and their points, in the
+//! same order. The work runs on the GPU or on this machine's processor, with the same results.
 //! Frame and unit: peaks in pixels and grey levels, points in the poses' frame, mm.
 
 use super::{Along, Ambient, Extraction, Format, Place, Processor, Why};
@@ -18,60 +18,61 @@ use crate::stages::stripe::point::{Optics, Point, plane_in_view, pose_words};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
-/// The peaks of one shot and their points, entry by entry.
+/// The peaks of one shot and their points: entry i of one belongs to entry i of the other.
 pub struct Measured {
-    /// Number of the shot, as it was submitted.
+    /// Index of the shot, as submitted.
     pub shot: u32,
-    /// Where the camera stood, as it was submitted.
+    /// Pose of the camera, as submitted.
     pub place: Place,
-    /// Every peak, the rejected ones too; px and grey levels.
+    /// All peaks, including rejected ones; px and grey levels.
     pub peaks: Vec<Peak>,
-    /// In the cloud's frame, mm; not a number where the peak was refused.
+    /// Points in the cloud's frame, mm; NaN where the peak was rejected.
     pub points: Vec<Point>,
 }
 
-/// One picture to work on.
+/// One picture to process.
 struct Job {
     shot: u32,
     place: Place,
     image: Image,
 }
 
-/// What the engine needs to know of the rig: where in the picture the laser can be, and where its points lie.
+/// What the engine needs to know of the rig: where in the picture the laser can appear, and where its points lie.
 pub struct Optical {
-    /// At the resolution of the pictures; px.
+    /// Camera at the resolution of the pictures; px.
     pub camera: Intrinsics,
     /// The sheet of light, camera frame, mm.
     pub laser: Plane<Camera>,
-    /// Nearest and farthest camera depth believed, mm.
+    /// Nearest and farthest credible camera depth, mm.
     pub depth_mm: [f64; 2],
 }
 
-/// What a batch carries through the chain: of each picture the number and where the camera stood.
+/// What a batch carries through the chain for each picture: its index and the pose of the camera.
 type Posed = (u32, Place);
 
-/// What some pictures say of the stripe.
+/// What some pictures show of the stripe.
 pub struct StripeSeen {
     /// Medians over the pictures.
     pub stripe: Stripe,
-    /// Pixels of the sensor that shine by themselves.
+    /// Pixels of the sensor that are bright without light.
     pub hot: HotPixels,
-    /// Half of the pictures show a long piece of it.
+    /// Whether half of the pictures show a long piece of the stripe.
     pub enough: bool,
 }
 
 impl StripeSeen {
-    /// A stripe that nobody looked for.
+    /// A stripe that was not measured.
     pub fn assumed(stripe: Stripe) -> StripeSeen {
         StripeSeen { stripe, hot: HotPixels::default(), enough: false }
     }
 }
 
-/// A piece of the stripe that tells its width is at least this share of what crosses the picture: beside a part a
-/// scan sees splinters of light at its edges.
+/// A piece of the stripe serves to measure its width if its length is at least this share of the picture's extent
+/// along the stripe. Beside a part a scan sees only splinters of light at its edges.
 const LONG_PIECE: f32 = 0.1;
 
-/// What does the work, built when the stripe is known, because its sizes follow from the stripe.
+/// The implementation that does the work. It is built when the stripe is known, because its buffer sizes depend on
+/// the stripe.
 enum Way {
     Gpu(Box<Chain<Vec<Posed>>>),
     Host(Box<Host>),
@@ -83,28 +84,28 @@ pub struct Engine {
     region: Mask,
     ambient: Option<Ambient>,
     optics: Optics,
-    /// As asked for, and made for the stripe.
+    /// The settings as requested, and those adapted to the stripe.
     asked: Extraction,
     extraction: Extraction,
     width_px: f32,
     hot: HotPixels,
     pending: Vec<Job>,
-    /// `None` runs on this machine's processor, and why.
+    /// `None` runs on this machine's processor; `why` holds the reason.
     device: Option<Device>,
     why: Why,
     way: Option<Way>,
-    /// Pictures that are started together, and batches under way; `None` is what the size asks for.
+    /// Pictures started together, and batches in flight; `None`: chosen from the pictures' size.
     at_once: Option<(u32, usize)>,
-    /// The batch that was collected last; its memory is used again.
+    /// The batch that was collected last; its memory is reused.
     batch: Batch<Vec<Posed>>,
     done: Vec<Measured>,
     cut: u64,
 }
 
-/// Shots that the processor works on together, at least: as many as it has threads, and enough for their ends to
-/// overlap.
+/// Least number of shots that the processor works on together. It uses as many as it has threads, and enough for the
+/// shots' ends to overlap.
 const HOST_BATCH: usize = 4;
-/// Of pictures above this size three are enough to measure the stripe: each has thousands of peaks.
+/// Above this size in pixels three pictures suffice to measure the stripe: each has thousands of peaks.
 const LARGE_PIXELS: u32 = 2_000_000;
 
 impl Engine {
@@ -140,23 +141,23 @@ impl Engine {
         }
     }
 
-    /// Every picture is started by itself, the next when it is done: least delay instead of most shots a second.
+    /// Starts every picture alone, and the next when it is done: least delay instead of the highest rate of shots.
     pub fn one_at_a_time(mut self) -> Engine {
         self.at_once = Some((1, 1));
         self
     }
 
-    /// The pictures' longer side, px: the same of a camera that is turned.
+    /// The pictures' longer side, px. It does not depend on how the camera is turned.
     pub fn longer_side(&self) -> u32 {
         self.format.width.max(self.format.height)
     }
 
-    /// Skeleton pixels that found no room in the GPU's list: more than a twentieth of the pictures.
+    /// Skeleton pixels that did not fit into the GPU's list, which holds a twentieth of the pictures' pixels.
     pub fn cut(&self) -> u64 {
         self.cut
     }
 
-    /// Adapter and driver, or this machine's processor and why.
+    /// Adapter and driver, or this machine's processor with the reason for it.
     pub fn ran_on(&self) -> String {
         match &self.device {
             Some(d) => format!("{}, {}", d.info.name, d.info.driver),
@@ -169,9 +170,9 @@ impl Engine {
         self.device.as_ref()
     }
 
-    /// Noise, width and speckle of the stripe, the median over some pictures; `None` where none shows enough of it.
-    /// Pictures that show a long piece count alone where there are any: light that falls over an edge is narrower
-    /// than the stripe.
+    /// Noise, width and speckle of the stripe, the median over some pictures; `None` if no picture shows enough of
+    /// it. If some pictures show a long piece, only those count: light that falls over an edge is narrower than the
+    /// stripe.
     pub fn measure(&self, images: &[&Image]) -> Option<StripeSeen> {
         let few = self.format.width * self.format.height > LARGE_PIXELS && images.len() > 3;
         let step = if few { images.len() / 3 } else { 1 };
@@ -205,15 +206,15 @@ impl Engine {
         Some(StripeSeen { stripe, hot, enough: 2 * telling >= images.len() })
     }
 
-    /// Length of a stripe that crosses the region which is looked at, px.
+    /// Length of a stripe that crosses the searched region, px.
     pub fn along_px(&self) -> f32 {
         let [x, y] = self.optics.across().to_array();
         let [left, top, right, bottom] = self.asked.region_px(self.format);
         (right - left) as f32 * y.abs() + (bottom - top) as f32 * x.abs()
     }
 
-    /// Takes over a stripe: the sizes of the fit, the least window of the threshold, limits above the noise; builds
-    /// the GPU's chain or the processor's. What is under way is collected before.
+    /// Adopts a stripe: sets the sizes of the fit, the least window of the threshold and the limits above the noise.
+    /// Builds the GPU's chain or the processor's. Batches in flight are collected before.
     pub fn set_stripe(&mut self, stripe: &Stripe) -> Result<()> {
         self.width_px = stripe.width_px;
         self.extraction = self.asked.clone().for_stripe(stripe);
@@ -221,12 +222,12 @@ impl Engine {
         self.build()
     }
 
-    /// In pictures that are submitted from now on these pixels are what stands beside them along the stripe.
+    /// In pictures submitted from now on, each of these pixels is replaced by its neighbours along the stripe.
     pub fn set_hot(&mut self, hot: HotPixels) {
         self.hot = hot;
     }
 
-    /// The chain's settings for an extraction: the same on a GPU and without one.
+    /// The chain's settings for an extraction; they are the same with and without a GPU.
     fn config(&self, e: &Extraction) -> ChainConfig {
         ChainConfig {
             region: Some(self.region.clone()),
@@ -235,7 +236,7 @@ impl Engine {
         }
     }
 
-    /// The chain for the present settings.
+    /// Builds the chain for the present settings.
     fn build(&mut self) -> Result<()> {
         let config = self.config(&self.extraction);
         self.way = Some(match &self.device {
@@ -249,7 +250,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Takes a picture, and where the camera stood.
+    /// Takes a picture and the pose of the camera.
     pub fn submit(&mut self, shot: u32, mut image: Image, place: Place) -> Result<()> {
         self.hot.fill(&mut image, Along::crossed(self.optics.across()).step());
         self.pending.push(Job { shot, place, image });
@@ -261,7 +262,7 @@ impl Engine {
         if self.pending.len() >= full { self.start() } else { Ok(()) }
     }
 
-    /// Shots that are done, in order; with `all` waits for everything under way.
+    /// Shots that are done, in order; with `all` it waits for everything in flight.
     pub fn collect(&mut self, all: bool) -> Result<Vec<Measured>> {
         if all && !self.pending.is_empty() {
             self.start()?;
@@ -274,7 +275,7 @@ impl Engine {
         Ok(std::mem::take(&mut self.done))
     }
 
-    /// Works on what is pending: on the GPU it is started, on the processor it is done.
+    /// Processes the pending pictures: the GPU starts them, the processor completes them.
     fn start(&mut self) -> Result<()> {
         if self.way.is_none() {
             self.build()?;
@@ -310,26 +311,27 @@ impl Engine {
         for (i, &(shot, place)) in batch.tag.iter().enumerate() {
             let part = batch.starts[i] as usize..batch.starts[i + 1] as usize;
             let mut peaks = batch.peaks[part.clone()].to_vec();
-            // The GPU counts within the batch.
+            // The GPU numbers the shots within the batch.
             peaks.iter_mut().for_each(|k| k.shot = shot);
             self.done.push(Measured { shot, place, peaks, points: batch.points[part].to_vec() });
         }
     }
 
-    /// The picture without the ambient light.
+    /// The picture with the ambient light subtracted.
     fn lit<'a>(&self, image: &'a Image) -> Cow<'a, Image> {
         self.ambient.as_ref().map_or(Cow::Borrowed(image), |a| Cow::Owned(ambient::without(image, &a.image)))
     }
 }
 
-/// Pixels of a block whose corners are looked at first.
+/// Size in pixels of a block whose corners are examined first.
 const BLOCK: (u32, u32) = (32, 16);
-/// How far the corners' depths must be from a limit for the whole block to be on their side of it, a share of the
-/// limit. One over depth is linear over the picture but for the lens, which bends it by far less than this within a
-/// block.
+/// Least distance of the corners' depths from a limit, as a share of the limit, for the whole block to lie on their
+/// side of it. Inverse depth is linear over the picture except for lens distortion, which within a block is far
+/// smaller than this.
 const CLEAR: f64 = 1e-3;
 
-/// Pixels that are looked at: where the laser plane lies within the believed depths, in the region that a person chose.
+/// Pixels that are searched: where the laser plane lies within the credible depths, inside the region that the user
+/// chose.
 fn believed(format: Format, o: &Optical, extraction: &Extraction) -> Mask {
     let mut mask = region(format, o);
     let [left, top, right, bottom] = extraction.region_px(format);
@@ -340,13 +342,13 @@ fn believed(format: Format, o: &Optical, extraction: &Extraction) -> Mask {
     mask
 }
 
-/// Pixels at which the laser plane lies within the believed depths; others are neither processed nor believed.
+/// Pixels at which the laser plane lies within the credible depths. Other pixels are not processed.
 fn region(format: Format, o: &Optical) -> Mask {
     let (w, h) = (format.width, format.height);
     let [near, far] = o.depth_mm;
     let depth = |x: u32, y: u32| plane_in_view(&o.camera, &o.laser, x, y);
     let inside = |x: u32, y: u32| depth(x, y).is_some_and(|z| (near..=far).contains(&z));
-    // A pixel's inverse lens costs a microsecond, and nearly all blocks are wholly in or out.
+    // Inverting the lens distortion takes a microsecond a pixel, and nearly all blocks lie wholly inside or outside.
     let block = |x: u32, y: u32| -> Option<bool> {
         let (right, below) = ((x + BLOCK.0 - 1).min(w - 1), (y + BLOCK.1 - 1).min(h - 1));
         let corners = [depth(x, y)?, depth(right, y)?, depth(x, below)?, depth(right, below)?];
@@ -379,8 +381,8 @@ mod tests {
 
     #[test]
     fn the_region_is_the_same_block_by_block_and_pixel_by_pixel() {
-        // A common lens and a strong one, a sheet across the picture and one along a diagonal; a size of no whole
-        // blocks.
+        // A common lens and one with strong distortion, a sheet across the picture and one along a diagonal; a size
+        // that is no multiple of the block.
         for (k, normal) in [(-0.118, [-0.019, 0.883, 0.469]), (-0.31, [0.55, 0.6, 0.58])] {
             let camera = Intrinsics {
                 fx: 611.6,

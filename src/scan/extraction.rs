@@ -1,5 +1,5 @@
-//! In: nothing. Out: all settings of the way from picture to points, one group a step.
-//! Frame and unit: each field says; sizes are in stripe widths where the physics scales with the stripe.
+//! In: nothing. Out: all settings of the chain from picture to points, one group a step.
+//! Frame and unit: stated at each field; sizes are in stripe widths where the physics scales with the stripe.
 
 use super::Format;
 use crate::fault::{Fault, Result};
@@ -14,11 +14,11 @@ use crate::stages::stripe::spacing;
 use crate::stages::support::params::SupportParams;
 use crate::stages::{Thinning, ThresholdParams};
 
-/// Which rule thins the lit pixels.
+/// The rule that thins the bright pixels to a skeleton.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rule {
-    /// By the direction of the stripe.
+    /// Chosen by the direction of the stripe.
     #[default]
     Auto,
     /// [`Thinning::ZhangSuen`], whatever the direction.
@@ -42,41 +42,40 @@ impl Rule {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Extraction {
-    /// Measure the stripe's width and speckle and the noise of dark pixels in the first shots and take the window of
-    /// the threshold and the sizes of the fit from them, and raise the limits of light above the noise. Off: the
-    /// numbers below are used as they stand.
+    /// Measure the stripe's width and speckle and the noise of dark pixels in the first shots. They set the
+    /// threshold's window and the sizes of the fit, and raise the brightness limits above the noise. Off: the
+    /// numbers below are used unchanged.
     pub measure_stripe: bool,
-    /// Take out of the cloud what the reported places scatter by about a smooth path, as far as the surface shows
-    /// that the camera did not move so: lines of a scan that stand higher or lower than their neighbours. Off: every
-    /// shot lies where it was reported.
+    /// Remove from the cloud the scatter of the reported poses about a smooth path, as far as the surface shows that
+    /// the camera did not move so. Such scatter makes lines of a scan lie higher or lower than their neighbours.
+    /// Off: every shot lies where its pose was reported.
     pub straighten: bool,
-    /// Take out of the cloud by how much the light's middle lies off the sheet's where the surface's brightness
-    /// changes from shot to shot, as far as the cloud shows that it does. Off: every point lies where the light's
-    /// middle was.
+    /// Correct the offset between the light's centre and the middle of a laser sheet of finite thickness. It occurs
+    /// where the surface's brightness changes from shot to shot, and is corrected as far as the cloud shows it. Off:
+    /// every point lies where the light's centre was.
     pub thick_sheet: bool,
-    /// Where in the picture the stripe is looked for: left, top, right and bottom as shares of its width and height,
-    /// 0..=1. A tool that stands in the picture, or a place that always shines, is left out so; places in the picture
-    /// stay what they are.
+    /// Region of the picture that is searched for the stripe: left, top, right and bottom as shares of its width and
+    /// height, 0..=1. It serves to exclude a tool in the view or a place that always shines. Pixel coordinates do
+    /// not change.
     pub region: [f64; 4],
-    /// Offset and minimum in grey levels of an 8-bit picture; deeper ones scale them.
+    /// Offset and minimum in grey levels of an 8-bit picture; they are scaled for deeper ones.
     pub threshold: ThresholdParams,
-    /// The thinning's rule; `auto` takes the one for the direction in which the rig sees its stripe
+    /// The thinning rule; `auto` takes the one for the direction in which the rig's stripe moves with depth
     /// ([`Thinning::across`]).
     pub thinning: Rule,
-    /// How far the ends of lines are carried on.
+    /// How far the ends of lines are extended.
     pub lengthen: LengthenParams,
-    /// Least distance of two fits that the skeleton asks for across the stripe, in stripe widths (sigma), 0..=6; 0
-    /// fits every pixel of the skeleton. Matters where the stripe is wider than 2 px: its pixels across the stripe
-    /// find the same centre.
+    /// Least distance between two fits across the stripe, in stripe widths (sigma), 0..=6; 0 fits every pixel of the
+    /// skeleton. It matters where the stripe is wider than 2 px: its pixels across the stripe find the same centre.
     pub spacing: f32,
-    /// Lit pixels need others near them ([`spacing::COMPANY`]). No setting: it follows from the noise.
+    /// Whether bright pixels need others near them ([`spacing::COMPANY`]). Not a setting: it follows from the noise.
     #[serde(skip)]
     pub company: bool,
     /// The sub-pixel fit across the stripe.
     pub peak: PeakParams,
-    /// What a peak must be to be believed.
+    /// Conditions that a peak must meet to be accepted.
     pub choose: ChooseParams,
-    /// How much of a neighbourhood in the shots around it a point needs.
+    /// How many neighbours a point needs in the shots around it.
     pub support: SupportParams,
 }
 
@@ -87,7 +86,7 @@ impl Default for Extraction {
             straighten: true,
             thick_sheet: true,
             region: WHOLE,
-            // A peak fainter than 8 levels is not believed, so a pixel darker than that need not be looked at.
+            // A peak fainter than 8 levels is rejected, so darker pixels need not be examined.
             threshold: ThresholdParams { minimum: 8, ..ThresholdParams::default() },
             thinning: Rule::default(),
             lengthen: LengthenParams::default(),
@@ -102,22 +101,23 @@ impl Default for Extraction {
 
 /// The whole picture.
 const WHOLE: [f64; 4] = [0.0, 0.0, 1.0, 1.0];
-/// Least width and height of the region, share of the picture: a slip of the finger is no region.
+/// Least width and height of the region, share of the picture; a smaller one is taken for a slip of the mouse.
 const LEAST_REGION: f64 = 0.02;
 
-/// Least window of the threshold in stripe sigmas: the stripe fills a sixth of it, so the mean stays that
-/// of the surroundings and the flanks stay lit.
+/// Least window of the threshold in stripe sigmas. The stripe fills a sixth of it, so the mean stays that of the
+/// surroundings and the stripe's flanks stay above the threshold.
 const WINDOW_WIDTHS: f32 = 24.0;
-/// Standard deviations of a dark pixel by which light exceeds it: one pixel in 740 of pure noise does, and such
-/// specks have no company ([`spacing::COMPANY`]). With a fourth a stripe four times as bright as the noise loses half
-/// of its points.
+/// Standard deviations of a dark pixel by which light must exceed it. One pixel in 740 of pure noise does, and such
+/// specks have no neighbours ([`spacing::COMPANY`]). With 4 instead, a stripe four times as bright as the noise
+/// loses half of its points.
 const ABOVE_NOISE: f32 = 3.0;
-/// Of light that stands so many above it, one dark pixel in 30,000 is taken for it: no company is asked for.
+/// From this many standard deviations on, only one dark pixel in 30,000 is taken for light, and bright pixels need
+/// no neighbours.
 const FREE_OF_SPECKS: f32 = 4.0;
 
 impl Extraction {
-    /// The same for pictures whose dark pixels scatter by `noise` grey levels of an 8-bit picture: no limit of light
-    /// lies within it.
+    /// The same settings for pictures whose dark pixels scatter by `noise` grey levels of an 8-bit picture:
+    /// brightness limits are raised above the noise.
     pub fn in_noise(mut self, noise: f32) -> Extraction {
         let least = (ABOVE_NOISE * noise).round().min(255.0);
         self.threshold.offset = self.threshold.offset.max(least as i32);
@@ -130,7 +130,7 @@ impl Extraction {
         self
     }
 
-    /// The same for pictures with such a stripe: the sizes of the fit, the least window of the threshold, limits
+    /// The same settings for pictures with such a stripe: sizes of the fit, least window of the threshold, limits
     /// above the noise.
     pub fn for_stripe(self, stripe: &Stripe) -> Extraction {
         let mut e = self.in_noise(stripe.noise);
@@ -140,20 +140,20 @@ impl Extraction {
         e
     }
 
-    /// The region's pixels, those whose middle lies in it: first and last column and row behind the last, at this
-    /// size of pictures.
+    /// The region's pixels at this picture size, those whose centre lies in it: first column, first row, and one
+    /// past the last column and row.
     pub fn region_px(&self, format: Format) -> [u32; 4] {
         let edge = |share: f64, size: u32| (share * f64::from(size) - 0.5).ceil().clamp(0.0, f64::from(size)) as u32;
         let ([left, top, right, bottom], (w, h)) = (self.region, (format.width, format.height));
         [edge(left, w), edge(top, h), edge(right, w), edge(bottom, h)]
     }
 
-    /// What a chain is built for: `scan`, `bench` and the peers run the same. Ends of lines are carried on by widths
-    /// of `width_px`.
+    /// The settings that a chain is built from; `scan`, `bench` and the peers use the same. Ends of lines are
+    /// extended by multiples of `width_px`.
     pub fn chain(&self, format: Format, optics: Optics, width_px: f32) -> ChainConfig {
         let shift = format.bits - 8;
         let ThresholdParams { offset, minimum, .. } = self.threshold;
-        // Grey levels are set for 8 bits and hold for every depth.
+        // The settings are grey levels of 8 bits; they are scaled to the pictures' depth.
         let threshold = ThresholdParams {
             offset: offset << shift,
             minimum: ((u32::from(minimum) << shift).min(0xffff)) as u16,

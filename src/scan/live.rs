@@ -10,13 +10,13 @@ use crate::rig::{Rig, Volume};
 /// The stripe chain for one picture at a time.
 pub struct Live {
     engine: Engine,
-    /// The stripe's width and speckle are known, from the first picture that showed it.
+    /// Whether the stripe's width and speckle are known, from the first picture that showed it.
     ready: bool,
 }
 
 impl Live {
-    /// Refused: a rig without camera or laser plane; pictures that the camera's calibration does not cover; no GPU
-    /// where one is asked for.
+    /// Refuses a rig without camera or laser plane, pictures that the camera's calibration does not cover, and a
+    /// missing GPU if one is requested.
     pub fn new(
         rig: &Rig,
         pictures: impl Into<Pictures>,
@@ -34,7 +34,7 @@ impl Live {
         Ok(Live { engine, ready: false })
     }
 
-    /// Adapter and driver, or this machine's processor and why.
+    /// Adapter and driver, or this machine's processor with the reason for it.
     pub fn ran_on(&self) -> String {
         self.engine.ran_on()
     }

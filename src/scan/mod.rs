@@ -1,6 +1,6 @@
 //! In: shots with poses and a calibrated rig. Out: point clouds, height maps and the files that hold them.
 //! Frame and unit: clouds in the frame of what is measured ([`crate::recording::Motion::frame`], mostly the robot's
-//! base), height maps in a grid frame of their own; mm.
+//! base), height maps in a separate grid frame; mm.
 
 mod ambient;
 mod captured;

@@ -1,11 +1,11 @@
-//! In: a shot's picture and its peaks. Out: the part of the picture with the stripe, enlarged, every
-//! peak drawn at its sub-pixel place in the colour of its fate, with a legend that counts them.
+//! In: a shot's picture and its peaks. Out: the part of the picture with the stripe, enlarged. Every peak is drawn
+//! at its sub-pixel position in the colour of its rejection reason, with a legend that counts them.
 //! Frame and unit: pixels of the shot.
 
 use crate::raster::{Image, Rgb, RgbImage, text_width};
 use crate::stages::peak::found::{Peak, Reject};
 
-/// Colour of a peak's fate; kept is green, everything else is told apart by hue.
+/// Colour of a peak's rejection reason: accepted peaks are green, each reason has another hue.
 pub fn colour(fate: Reject) -> Rgb {
     match fate {
         Reject::Kept => [0, 230, 60],
@@ -23,12 +23,12 @@ pub fn colour(fate: Reject) -> Rgb {
 
 /// Rows shown above and below the outermost peaks, px.
 const MARGIN: i64 = 40;
-/// The picture is enlarged by whole steps until it is at least this wide, px.
+/// The picture is enlarged by an integer factor until it is at least this wide, px.
 const WIDE: u32 = 1200;
 const LEGEND: i64 = 30;
 
-/// Draws all peaks, the kept ones last. Only rows around the kept peaks are shown (around all of them
-/// where none was kept), with a square-root curve, because reflections are faint.
+/// Draws all peaks, the accepted ones last. It shows only the rows around the accepted peaks, or around all peaks if
+/// none was accepted. Grey levels follow a square-root curve, because reflections are faint.
 pub fn draw(image: &Image, peaks: &[Peak]) -> RgbImage {
     let any_kept = peaks.iter().any(Peak::kept);
     let rows = peaks.iter().filter(|k| k.kept() || !any_kept).map(|k| k.v.round() as i64);
@@ -55,7 +55,7 @@ pub fn draw(image: &Image, peaks: &[Peak]) -> RgbImage {
             let ink = colour(k.reject());
             picture.set(x, y, ink);
             if !kept {
-                // Rejected peaks are few and must be seen: a small cross.
+                // Rejected peaks are few and must be visible: they get a small cross.
                 for d in 1..=scale + 1 {
                     [(d, 0), (-d, 0), (0, d), (0, -d)].iter().for_each(|(dx, dy)| picture.set(x + dx, y + dy, ink));
                 }
@@ -86,7 +86,7 @@ mod tests {
         let echo = peak(300.25, 120.0, 0);
         let picture = draw(&image, &[echo, peak(100.0, 100.0, 0)]);
         assert_eq!(picture.width, 1280);
-        // Rows 60..=160 are shown, twice enlarged; u 300.25 is at (300.75 * 2 - 0.5).
+        // Rows 60..=160 are shown, enlarged twice; u 300.25 is at (300.75 * 2 - 0.5).
         assert_eq!(picture.height as i64, (160 - 60 + 1) * 2 + LEGEND);
         let row = (120 - 60) * 2;
         let lit = |x: i64| [row, row + 1].iter().any(|y| picture.pixels[(y * 1280 + x) as usize][1] > 100);

@@ -1,6 +1,6 @@
 //! In: a cloud, in memory or on disk. Out: a binary PCD (Point Cloud Library), streamed.
-//! Frame and unit: the cloud's frame, mm, both in the header's second comment; the PLY's fields under the names that
-//! PCL viewers know.
+//! Frame and unit: the cloud's frame, mm; the header's second comment states both. The fields are those of the PLY,
+//! under the names that PCL viewers know.
 
 use super::{CloudPoint, PointSource};
 use crate::fault::{Fault, Result};
@@ -43,7 +43,7 @@ fn record(p: &CloudPoint) -> [u8; 36] {
     bytes
 }
 
-/// Writes `path` under a temporary name and renames it when it is complete. `frame`: of the points.
+/// Writes `path` under a temporary name and renames it when it is complete. `frame` is the points' frame.
 pub fn write_pcd(path: &Path, source: &(impl PointSource + ?Sized), count: u64, frame: &str) -> Result<()> {
     let file = crate::files::Aside::create(path)?;
     let mut out = BufWriter::with_capacity(1 << 20, file.file());

@@ -1,5 +1,5 @@
-//! In: where the stages shall run, the adapters of this machine. Out: the GPU, opened, or this machine's own
-//! processor, and why.
+//! In: the place where the stages are to run, and this machine's adapters. Out: an opened GPU, or this machine's own
+//! processor with the reason for it.
 //! Frame and unit: none.
 
 use crate::fault::Result;
@@ -9,10 +9,11 @@ use crate::gpu::{AdapterInfo, Device, adapters};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
 #[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Where {
-    /// On the GPU where there is one with processors of its own, else on this machine's, which gives the same results.
+    /// On a GPU with dedicated processors if there is one, else on this machine's processor, which gives the same
+    /// results.
     #[default]
     Auto,
-    /// On the best GPU adapter, a software one too; a machine without any is refused.
+    /// On the best GPU adapter, which may be a software one; a machine without any adapter is refused.
     Gpu,
     /// On this machine's own processor.
     Cpu,
@@ -25,11 +26,11 @@ fn unknown(word: &str) -> String {
 /// Why the stages run without a GPU.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Why {
-    /// Somebody chose the processor.
+    /// The user chose the processor.
     Asked,
     /// This machine has no GPU adapter.
     NoAdapter,
-    /// The best adapter is software of this name: it has the same cores and a longer way to them.
+    /// The best adapter is software of this name: it uses the same cores, with more overhead.
     Software(String),
     /// The adapter did not open.
     Failed(String),
@@ -49,38 +50,38 @@ impl std::fmt::Display for Why {
 /// What the stages run on.
 #[derive(Clone)]
 pub enum Processor {
-    /// This machine's own.
+    /// This machine's own processor.
     Host(Why),
     /// A GPU, opened.
     Gpu(Device),
 }
 
 impl Processor {
-    /// This machine's own, as asked.
+    /// This machine's own processor, by request.
     pub fn host() -> Processor {
         Processor::Host(Why::Asked)
     }
 }
 
 impl Where {
-    /// Refused: `Where::Gpu` on a machine without one.
+    /// Refuses `Where::Gpu` on a machine without an adapter.
     pub fn open(self) -> Result<Processor> {
-        // Who names an adapter asks for it.
+        // Whoever names an adapter wants it to be used.
         let named = std::env::var_os("SHEETLIGHT_ADAPTER").is_some_and(|name| !name.is_empty());
         Ok(match self {
             Where::Cpu => Processor::host(),
             Where::Gpu => Processor::Gpu(Device::open()?),
             Where::Auto => match without_gpu(&adapters(), named) {
                 Some(why) => Processor::Host(why),
-                // The results are the same, so a GPU that does not open is no error.
+                // The results are the same, so a GPU that cannot be opened is no error.
                 None => Device::open().map_or_else(|fault| Processor::Host(Why::Failed(fault.what)), Processor::Gpu),
             },
         })
     }
 }
 
-/// Why the best of these adapters is passed over, if it is: a software adapter was slower at every size
-/// (`sheetlight doctor` times both).
+/// The reason why the best of these adapters is not used, if there is one. A software adapter was slower at every
+/// size (`sheetlight doctor` times both).
 fn without_gpu(adapters: &[AdapterInfo], named: bool) -> Option<Why> {
     match adapters.first() {
         _ if named => None,

@@ -1,4 +1,4 @@
-//! In: shots in order, a calibrated rig, settings. Out: their profiles in order: peaks with their fate,
+//! In: shots in order, a calibrated rig, settings. Out: their profiles in order: peaks with their rejection reason,
 //! points with their standard deviation.
 //! Frame and unit: points in the carrier's frame (mostly the robot's base), mm (docs/math.md, Stripe peak; the
 //! paper's eq. 5 and 6).
@@ -17,29 +17,29 @@ use crate::stages::peak::params::PeakParams;
 use crate::stages::stripe::point::Optics;
 use crate::stages::support::{self, Support};
 
-/// What one shot came to.
+/// The result of one shot.
 #[derive(Clone, Debug)]
 pub struct Profile {
     /// Index of the shot in the recording, from 0.
     pub shot: u32,
-    /// Every peak, the rejected ones with their reason.
+    /// All peaks; rejected ones carry their reason.
     pub peaks: Vec<Peak>,
-    /// One point a kept peak.
+    /// One point per accepted peak.
     pub points: Vec<CloudPoint>,
-    /// Where the camera stood, cloud's frame, mm.
+    /// Pose of the camera, cloud's frame, mm.
     pub from_camera: Rigid<Base, Camera>,
 }
 
-/// Shots looked at for the stripe's width before the first profile leaves.
+/// Number of shots used to measure the stripe's width before the first profile is ready.
 const MEASURED_SHOTS: usize = 8;
-/// A scan that begins beside the part waits for its stripe: at most so many shots, and so many bytes of pictures
-/// where those are more than [`MEASURED_SHOTS`] shots. Dark ones before are measured with the width that was assumed.
+/// A scan that begins beside the part waits for its stripe: at most this many shots, and this many bytes of pictures
+/// if that is more than [`MEASURED_SHOTS`] shots. Earlier dark shots are measured with the assumed width.
 const HELD_SHOTS: usize = 64;
 const HELD_BYTES: usize = 256 << 20;
-/// Places of the picture, each way, at which is looked for where the sheet is seen.
+/// The picture is sampled at this many positions in each direction to find where the sheet is visible.
 const SEEN_PLACES: u32 = 16;
 
-/// The life of a shot from picture to points, a few shots at a time; memory does not grow with the scan.
+/// Takes a shot from picture to points, a few shots at a time; memory does not grow with the scan.
 pub struct Scanner {
     engine: Engine,
     ambient: Option<Ambient>,
@@ -48,27 +48,27 @@ pub struct Scanner {
     /// Where the laser plane meets the optical axis, or comes closest to it; camera frame, mm.
     anchor: Vec3,
     extraction: Extraction,
-    /// Held until the stripe is measured.
+    /// Shots held until the stripe is measured.
     waiting: Vec<Shot>,
     stripe: Option<Stripe>,
     hot: HotPixels,
-    /// Hot pixels of the camera's calibration; empty where its pictures are read otherwise, and said to be.
+    /// Hot pixels of the camera's calibration; empty if its pictures are read out in another way, which is reported.
     known_hot: HotPixels,
-    /// Of the pictures, px.
+    /// Size of the pictures, px.
     size: [u32; 2],
-    /// What the engine is built for: the stripe, or while all was dark the assumed one.
+    /// The stripe that the engine is built for; the assumed one while all pictures were dark.
     built: Option<Stripe>,
     support: Option<Support<Place>>,
-    /// Done before the engine was built anew.
+    /// Profiles done before the engine was rebuilt.
     early: Vec<Profile>,
     up: Vec3,
-    /// Where the scan's first shot was taken.
+    /// Camera pose at the scan's first shot.
     first: Option<Rigid<Base, Camera>>,
 }
 
 impl Scanner {
-    /// `carrier` says where the camera is at a shot; `ambient` is subtracted from every shot.
-    /// Refused: a rig without camera or laser plane; pictures that the camera's calibration does not cover.
+    /// `carrier` gives the camera pose at a shot; `ambient` is subtracted from every shot. Refuses a rig without
+    /// camera or laser plane, and pictures that the camera's calibration does not cover.
     pub fn new(
         rig: &Rig,
         carrier: Carrier,
@@ -110,14 +110,14 @@ impl Scanner {
         })
     }
 
-    /// Goes on with a scan of which an earlier part measured the stripe and began there: what follows from it stays
-    /// what it was.
+    /// Continues a scan whose earlier part measured the stripe and had the first shot. Everything derived from these
+    /// stays unchanged.
     pub fn resumed(mut self, stripe: Option<Stripe>, hot: HotPixels, first: Option<Rigid<Base, Camera>>) -> Scanner {
         (self.stripe, self.hot, self.first) = (stripe, hot, first);
         self
     }
 
-    /// Where the scan's first shot was taken, once one was.
+    /// Camera pose at the scan's first shot; `None` before it.
     pub fn first(&self) -> Option<Rigid<Base, Camera>> {
         self.first
     }
@@ -140,7 +140,7 @@ impl Scanner {
         if !self.extraction.measure_stripe {
             return self.settle(StripeSeen::assumed(self.assumed()));
         }
-        // Looked at again only when there are twice as many.
+        // Examined again only when the number of shots has doubled.
         let held = self.waiting.len();
         let full = held >= self.most_held();
         if held < MEASURED_SHOTS || !held.is_power_of_two() && !full {
@@ -153,7 +153,7 @@ impl Scanner {
         }
     }
 
-    /// What the shots that wait say of the stripe.
+    /// What the waiting shots show of the stripe.
     fn look(&self) -> Option<StripeSeen> {
         let images: Vec<_> = self.waiting.iter().map(|s| &s.image).collect();
         self.engine.measure(&images)
@@ -165,7 +165,7 @@ impl Scanner {
         self.release(seen.stripe)
     }
 
-    /// What the pictures say against the camera's calibration, once their hot pixels are known.
+    /// A remark if the pictures contradict the camera's calibration, once their hot pixels are known.
     pub fn remark(&self) -> Option<String> {
         self.hot.otherwise(&self.known_hot, self.size)?.remark().ok()
     }
@@ -175,7 +175,7 @@ impl Scanner {
         Stripe { width_px, speckle, ..Stripe::default() }
     }
 
-    /// Shots that may wait for a stripe.
+    /// Most shots that may wait for a stripe.
     fn most_held(&self) -> usize {
         let bytes =
             self.waiting.first().map_or(1, |s| s.image.pixel_count().max(1) * usize::from(s.image.bits.div_ceil(8)));
@@ -187,7 +187,7 @@ impl Scanner {
         self.collect(false)
     }
 
-    /// All that is still under way, after the last shot.
+    /// All profiles still in flight, after the last shot.
     pub fn finish(&mut self) -> Result<Vec<Profile>> {
         if !self.waiting.is_empty() {
             let known = self.stripe.map(|stripe| StripeSeen { hot: self.hot.clone(), ..StripeSeen::assumed(stripe) });
@@ -198,12 +198,12 @@ impl Scanner {
         self.collect(true)
     }
 
-    /// The stripe's width and speckle, once measured or assumed; a resumed scan needs them.
+    /// The stripe's width and speckle, once measured or assumed; needed to resume the scan.
     pub fn stripe(&self) -> Option<Stripe> {
         self.stripe
     }
 
-    /// Pixels of the sensor that shine by themselves, once looked for; a resumed scan needs them.
+    /// Pixels of the sensor that are bright without light, once looked for; needed to resume the scan.
     pub fn hot(&self) -> &HotPixels {
         &self.hot
     }
@@ -213,27 +213,27 @@ impl Scanner {
         Along::crossed(self.optics.across())
     }
 
-    /// Towards the camera at the first shot; on a turntable along its axis. Cloud's frame.
+    /// Direction towards the camera at the first shot; on a turntable along its axis. Cloud's frame.
     pub fn up_in_base(&self) -> Vec3 {
         self.up
     }
 
-    /// Skeleton pixels that found no room in the GPU's list.
+    /// Skeleton pixels that did not fit into the GPU's list.
     pub fn cut(&self) -> u64 {
         self.engine.cut()
     }
 
-    /// The GPU, if it has processors of its own: work that is light on the CPU pays only there.
+    /// The GPU, if it has dedicated processors. Work that is light on the CPU pays off only there.
     pub fn device(&self) -> Option<&Device> {
         self.engine.device().filter(|d| d.has_own_processors())
     }
 
-    /// Adapter and driver, or this machine's processor and why.
+    /// Adapter and driver, or this machine's processor with the reason for it.
     pub fn ran_on(&self) -> String {
         self.engine.ran_on()
     }
 
-    /// Hands what waits to the engine, built for this stripe.
+    /// Passes the waiting shots to the engine, built for this stripe.
     fn release(&mut self, stripe: Stripe) -> Result<()> {
         if self.built != Some(stripe) {
             self.build(stripe)?;
@@ -254,7 +254,7 @@ impl Scanner {
         self.built = Some(stripe);
         let base_from_camera = self.first.expect("a shot was taken");
         let towards = -base_from_camera.direction(&Vec3::z());
-        // Seen from the camera a turntable's part turns: its map lies over the table.
+        // Seen from the camera a turntable's part rotates, so its map lies parallel to the table.
         self.up = if self.carrier.turns() { Vec3::z() * towards.z.signum() } else { towards };
         let axis = base_from_camera.direction(&self.along());
         let field = self.pitch() * self.engine.longer_side() as f32;
@@ -268,7 +268,8 @@ impl Scanner {
         Vec3::new(ny, -nx, 0.0).try_normalize(1e-9).unwrap_or(Vec3::x())
     }
 
-    /// Places by which the distance of two shots is told, camera frame: on a turntable the middle hardly moves.
+    /// Points between which the distance of two shots is measured, camera frame. On a turntable the middle hardly
+    /// moves, so the ends are included.
     fn anchors(&self) -> [Vec3; 3] {
         if !self.carrier.turns() {
             return [self.anchor; 3];
@@ -277,7 +278,7 @@ impl Scanner {
         [self.anchor - half, self.anchor, self.anchor + half]
     }
 
-    /// What a pixel sees where the sheet meets the optical axis, mm.
+    /// Size that a pixel covers where the sheet meets the optical axis, mm.
     fn pitch(&self) -> f32 {
         (self.anchor.z / f64::from(self.optics.pinhole[0])) as f32
     }
@@ -321,7 +322,7 @@ impl Scanner {
     }
 }
 
-/// The standard deviation along the worst direction, with what the place of the shot adds.
+/// The standard deviation along the worst direction, with the pose's contribution.
 fn with_place(sigma_mm: f32, position: &glam::Vec3, place: &Place) -> f32 {
     if place.covariance.is_none() {
         return sigma_mm;
@@ -330,13 +331,14 @@ fn with_place(sigma_mm: f32, position: &glam::Vec3, place: &Place) -> f32 {
     (f64::from(sigma_mm).powi(2) + more).sqrt() as f32
 }
 
-/// The part of the allowed standard deviation that a peak leaves unused; halved where it is saturated.
+/// The share of the allowed standard deviation that a peak does not use; halved if the peak is saturated.
 fn quality(k: &Peak, limit_px: f32) -> f32 {
     let spare = (1.0 - k.sigma_px / limit_px).clamp(0.0, 1.0);
     if k.flags & SATURATED != 0 { 0.5 * spare } else { spare }
 }
 
-/// Where the sheet meets the optical axis if it is believed there, else the middle one of the places where it is seen.
+/// The point where the sheet meets the optical axis if its depth is credible, else the middle one of the points
+/// where the sheet is visible.
 fn anchor(camera: &Intrinsics, laser: &Plane<Camera>, depth_mm: [f64; 2]) -> Vec3 {
     let [near, far] = depth_mm;
     let z = laser.offset / laser.normal.z;

@@ -1,5 +1,5 @@
-//! In: where the camera stood at each shot of a scan. Out: `shots.jsonl`, which grows with the scan, and what a later
-//! step asks it: the camera at a shot, the image axis that the stripe runs along.
+//! In: the camera pose at each shot of a scan. Out: `shots.jsonl`, which grows with the scan. Later steps read from
+//! it the camera pose at a shot and the image axis that the stripe runs along.
 //! Frame and unit: the cloud's frame, mm (docs/file-formats.md).
 
 use super::CloudPoint;
@@ -17,23 +17,23 @@ pub const SHOTS_FILE: &str = "shots.jsonl";
 const FORMAT: &str = "sheetlight shots 1";
 const UNITS: &str = "mm";
 
-/// The image axis that a stripe runs along, of two the nearer one.
+/// The image axis that is closer to the stripe's direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Along {
     /// From column to column: a lying stripe.
     U,
-    /// From row to row: an upright one.
+    /// From row to row: an upright stripe.
     V,
 }
 
 impl Along {
-    /// Of a stripe that is crossed in this direction of the image.
+    /// The axis of a stripe whose normal in the image is this direction.
     pub fn crossed(Vec2 { x, y }: Vec2) -> Along {
         if y.abs() >= x.abs() { Along::U } else { Along::V }
     }
 
-    /// To the next pixel along the stripe: columns and rows, px.
+    /// Step to the next pixel along the stripe: columns and rows, px.
     pub fn step(self) -> [u32; 2] {
         match self {
             Along::U => [1, 0],
@@ -42,42 +42,42 @@ impl Along {
     }
 }
 
-/// What the points of a cloud do not say of the shots they are from.
+/// Data about the shots of a cloud that its points do not hold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shots {
     /// How the stripe lies in the pictures.
     pub along: Along,
-    /// Width of the stripe across it, px (1 sigma); `None` where nobody measured it.
+    /// Width of the stripe across it, px (1 sigma); `None` if it was not measured.
     pub stripe_px: Option<f32>,
-    /// The laser's sheet, camera frame; `None` where nobody wrote it down.
+    /// The laser's sheet, camera frame; `None` if it was not recorded.
     pub sheet: Option<Plane<Camera>>,
     places: BTreeMap<u32, Rigid<Base, Camera>>,
 }
 
 impl Shots {
-    /// Shots and where the camera stood, cloud's frame.
+    /// Shots with their camera poses, cloud's frame.
     pub fn new(along: Along, places: impl IntoIterator<Item = (u32, Rigid<Base, Camera>)>) -> Shots {
         Shots { places: places.into_iter().collect(), ..Shots::unplaced(along) }
     }
 
-    /// Of a sensor that nobody knows the places of: an imported map.
+    /// Shots with unknown poses, as of an imported map.
     pub fn unplaced(along: Along) -> Shots {
         Shots { along, stripe_px: None, sheet: None, places: BTreeMap::new() }
     }
 
-    /// The same shots, of a stripe so wide, px (1 sigma).
+    /// The same shots with this stripe width, px (1 sigma).
     pub fn with_stripe(self, stripe_px: Option<f32>) -> Shots {
         Shots { stripe_px, ..self }
     }
 
-    /// The same shots with their cameras elsewhere.
+    /// The same shots with other camera poses.
     pub fn moved(&self, motion: impl Fn(u32, Rigid<Base, Camera>) -> Rigid<Base, Camera>) -> Shots {
         let places = self.places().map(|(shot, place)| (shot, motion(shot, place))).collect();
         Shots { places, ..self.clone() }
     }
 
-    /// Puts points where the rays of their light's middle meet the sheet, from where [`super::Thick`] has them: edges
-    /// of parts are where the sheet's middle crosses them. Without a sheet they stay.
+    /// Moves points from where [`super::Thick`] put them to where the rays of their light's middle meet the sheet.
+    /// Edges of parts are where the sheet's middle crosses them. Without a sheet the points stay.
     pub fn onto_sheet(&self, points: &mut [CloudPoint]) {
         let Some(sheet) = &self.sheet else { return };
         for p in points {
@@ -90,17 +90,18 @@ impl Shots {
         }
     }
 
-    /// Where the camera stood, cloud's frame; `None` for a shot that is not listed.
+    /// Camera pose at a shot, cloud's frame; `None` for a shot that is not listed.
     pub fn place(&self, shot: u32) -> Option<&Rigid<Base, Camera>> {
         self.places.get(&shot)
     }
 
-    /// All shots and where the camera stood, in their order.
+    /// All shots with their camera poses, in their order.
     pub fn places(&self) -> impl Iterator<Item = (u32, Rigid<Base, Camera>)> + '_ {
         self.places.iter().map(|(shot, place)| (*shot, *place))
     }
 
-    /// The text of a scan folder's file with every place moved, `motion` of shot and place; all else stays what it is.
+    /// The text of a scan folder's file with every pose changed by `motion(shot, pose)`; everything else is
+    /// unchanged.
     pub fn rewritten(scan: &Path, motion: impl Fn(u32, Rigid<Base, Camera>) -> Rigid<Base, Camera>) -> Result<String> {
         let path = scan.join(SHOTS_FILE);
         let text = crate::files::read_text(&path)?;
@@ -117,10 +118,10 @@ impl Shots {
         lines.map(one).try_fold(head, |text, line: Result<String>| Ok(text + &line?))
     }
 
-    /// Reads a scan folder's file, of a cloud in `frame` that was made with `rig` (its fingerprint).
+    /// Reads a scan folder's file, for a cloud in `frame` that was made with `rig` (its fingerprint).
     ///
     /// # Errors
-    /// No file, lines that are none of these, a shot twice, another frame, unit or calibration.
+    /// No file, malformed lines, a shot listed twice, another frame, unit or calibration.
     pub fn load(scan: &Path, frame: &str, rig: &str) -> Result<Shots> {
         let path = scan.join(SHOTS_FILE);
         let again = "scan again";
@@ -173,7 +174,7 @@ struct Head {
     stripe_along: Along,
     /// Fingerprint of the rig that the points were made with.
     rig: String,
-    /// Its laser plane, camera frame; former versions left it out.
+    /// The rig's laser plane, camera frame; older versions did not write it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     sheet: Option<Plane<Camera>>,
 }
@@ -193,12 +194,13 @@ fn line<T: serde::Serialize>(value: &T) -> String {
 pub struct ShotsWriter {
     path: PathBuf,
     out: File,
-    /// Not yet written.
+    /// Lines not yet written.
     next: String,
 }
 
 impl ShotsWriter {
-    /// Starts a list; a former one of that name is discarded. `frame`: the cloud's; `rig`: the rig's fingerprint.
+    /// Starts a list; an existing one of that name is discarded. `frame` is the cloud's, `rig` the rig's
+    /// fingerprint.
     pub fn create(folder: &Path, frame: &str, along: Along, rig: &str, sheet: &Plane<Camera>) -> Result<ShotsWriter> {
         let head = Head {
             format: FORMAT.into(),
@@ -211,12 +213,12 @@ impl ShotsWriter {
         ShotsWriter::with(folder, &line(&head))
     }
 
-    /// Goes on with the list of an interrupted scan that did the shots before `done`; what came after is cut off.
+    /// Continues the list of an interrupted scan that completed the shots before `done`; later lines are cut off.
     ///
     /// # Errors
     /// As [`Shots::load`].
     pub fn resume(folder: &Path, done: usize, frame: &str, rig: &str) -> Result<ShotsWriter> {
-        // Stopped when what was measured had made room for what was made of it.
+        // The scan was stopped while the reported poses were set aside for the corrected ones.
         let (path, measured) = (folder.join(SHOTS_FILE), folder.join(format!("{SHOTS_FILE}.part")));
         if measured.exists() {
             moment().and_then(|()| std::fs::rename(&measured, &path)).map_err(|e| Fault::write(&path, e))?;
@@ -225,7 +227,7 @@ impl ShotsWriter {
             Some(text) => text,
             None => return Err(missing(folder)),
         };
-        // The last line may be half a line.
+        // The last line may be incomplete.
         let whole = text.split_inclusive('\n').filter(|l| l.ends_with('\n'));
         let is_done = |l: &&str| serde_json::from_str::<Line>(l).map_or(true, |l| (l.shot as usize) < done);
         let kept: String = whole.take_while(is_done).collect();
@@ -246,7 +248,7 @@ impl ShotsWriter {
         self.next += &line(&Line { shot, from_camera });
     }
 
-    /// Puts everything on the disk.
+    /// Syncs everything to the disk.
     pub fn checkpoint(&mut self) -> Result<()> {
         let text = std::mem::take(&mut self.next);
         moment()
@@ -282,7 +284,7 @@ mod tests {
             assert!(turn < 1e-12 && shift < 1e-9, "{s}");
         }
         assert!(whole.place(6).is_none());
-        // Half a line, and shots that the checkpoint does not know.
+        // An incomplete line, and shots beyond the checkpoint.
         let path = dir.path().join(SHOTS_FILE);
         let text = std::fs::read_to_string(&path).unwrap();
         std::fs::write(&path, &text[..text.len() - 30]).unwrap();

@@ -1,7 +1,7 @@
-//! In: a recording folder, or raw frames on a pipe with a pose file. Out: shots in order, decoded
-//! ahead on other threads, a bounded number of them in memory.
-//! Frame and unit: robot poses are base_from_flange, mm, an axis stands at counts; pictures in grey levels of the
-//! sensor's depth.
+//! In: a recording folder, or raw frames on a pipe with a pose file. Out: shots in order, decoded ahead on other
+//! threads, with a bounded number of them in memory.
+//! Frame and unit: robot poses are base_from_flange, mm; an axis position is in counts; pictures in grey levels of
+//! the sensor's depth.
 
 use crate::camera::Readout;
 use crate::capture::{Account, Format, Latency, Pictures, RawFormat, RawFrames};
@@ -14,33 +14,33 @@ use std::collections::BTreeSet;
 use std::io::Read;
 use std::sync::mpsc::{Receiver, sync_channel};
 
-/// A picture of the stripe, and where what moves stood when it was taken.
+/// A picture of the stripe, with the position of the robot or the axis when it was taken.
 #[derive(Clone, Debug)]
 pub struct Shot {
-    /// Place in the recording, from 0.
+    /// Index in the recording, from 0.
     pub index: u32,
-    /// What messages and reports call the picture.
+    /// Name of the picture in messages and reports.
     pub name: String,
     /// Grey levels of the sensor's depth.
     pub image: Image,
-    /// Where the robot's flange or the axis stood at it.
+    /// Pose of the robot's flange, or count of the axis, at the exposure.
     pub stand: Stand,
-    /// How far that may be off, where the time between the two is uncertain.
+    /// How far that may be off because the time between picture and position is uncertain.
     pub slip: Option<Slip>,
-    /// When its last byte was here, ns of the host's clock; none of files.
+    /// When its last byte arrived, ns of the host's clock; `None` for files.
     pub here_ns: Option<u64>,
 }
 
-/// A shot that could not be had, with the reason; the next one may be fine.
+/// A shot that could not be read, with the reason; the next one may be fine.
 #[derive(Clone, Debug)]
 pub struct BadShot {
-    /// Place in the recording, from 0.
+    /// Index in the recording, from 0.
     pub index: u32,
-    /// What messages and reports call the picture.
+    /// Name of the picture in messages and reports.
     pub name: String,
-    /// Why it could not be had.
+    /// Why it could not be read.
     pub fault: Fault,
-    /// The source has ended with it: there is no next shot, and leaving this one out mends nothing.
+    /// The source ended with it: there is no next shot, and excluding this one does not help.
     pub last: bool,
 }
 
@@ -48,30 +48,30 @@ pub struct BadShot {
 pub trait Source {
     /// Size and depth of all its shots.
     fn format(&self) -> Format;
-    /// What all its shots are, and how they were read from the sensor.
+    /// Format of all its shots, and how they were read out from the sensor.
     fn pictures(&self) -> Pictures {
         self.format().into()
     }
-    /// Number of shots still to come, where that is known.
+    /// Number of shots still to come, if known.
     fn remaining(&self) -> Option<usize>;
     /// The next shot, in order; `None` at the end.
     fn next(&mut self) -> Option<std::result::Result<Shot, BadShot>>;
-    /// Whether it can be opened again where it was left.
+    /// Whether the source can be opened again at the position where it was left.
     fn resumable(&self) -> bool {
         true
     }
-    /// What became of every picture that its camera sent, where it has one.
+    /// What became of every picture that its camera sent, if it has a camera.
     fn account(&self) -> Option<Account> {
         None
     }
-    /// What the scan's report must say of it.
+    /// Remarks for the scan's report.
     fn remarks(&self) -> Vec<String> {
         Vec::new()
     }
 }
 
-/// Memory for shots that are decoded ahead: at 640x480 two batches of the GPU's chain, eight shots at 12 MP and 8
-/// bits. Half as much again holds those that are being decoded.
+/// Memory for shots that are decoded ahead: at 640x480 two batches of the GPU's chain, at 12 MP and 8 bits eight
+/// shots. Shots being decoded take half as much again.
 const AHEAD_BYTES: usize = 100 << 20;
 
 /// A recording folder as a source.
@@ -82,12 +82,12 @@ pub struct RecordingSource {
     shots: Receiver<std::result::Result<Shot, BadShot>>,
 }
 
-/// Whether pictures and poses were brought together by time.
+/// Whether pictures and poses were paired by time.
 fn by_clock(meta: &Meta) -> bool {
     meta.frames.iter().flat_map(|f| &f.taken).any(|t| t.pairing == Some(Pairing::Clock))
 }
 
-/// Place and name of a picture, where things stood at it and how far that may be off.
+/// Index and name of a picture, the position at its exposure, and how far that may be off.
 type Job = (u32, String, Result<Stand>, Option<Slip>);
 
 /// The shots in order, decoded on another thread as far ahead as memory allows.
@@ -125,14 +125,14 @@ fn ahead(
 }
 
 impl RecordingSource {
-    /// Starts decoding at shot `first`. `poses` names the pose file where meta.json does not.
-    /// Refused: no laser pictures, a pose index outside the pose file.
+    /// Starts decoding at shot `first`. `poses` names the pose file if meta.json does not. Refuses a recording
+    /// without laser pictures, and a pose index outside the pose file.
     pub fn open(recording: &Recording, poses: Option<&str>, first: usize) -> Result<RecordingSource> {
         RecordingSource::late(recording, poses, first, None)
     }
 
-    /// [`RecordingSource::open`] where the pictures' times are known to be late against the poses': of pictures that
-    /// were paired by clock.
+    /// As [`RecordingSource::open`], with a known delay of the pictures' times against the poses'. It applies to
+    /// pictures that were paired by clock.
     pub fn late(
         recording: &Recording,
         poses: Option<&str>,
@@ -171,7 +171,7 @@ impl RecordingSource {
     }
 }
 
-/// A picture's name, where what moves stood when it was taken, and how far that may be off.
+/// A picture's name, the position at its exposure, and how far that may be off.
 type Stood = (String, Result<Stand>, Option<Slip>);
 
 fn slip_of(frame: &FrameRef) -> Option<Slip> {
@@ -201,8 +201,8 @@ fn posed(recording: &Recording, poses: Option<&str>) -> Result<Vec<Stood>> {
     frames.filter_map(|(i, f)| Some((i, f.laser.as_ref()?, f.pose))).map(stand).collect()
 }
 
-/// Pictures with the laser on and the axis' counts. One whose count is not known is a bad shot: nothing is made up
-/// for it.
+/// Pictures with the laser on and the axis' counts. A picture with an unknown count becomes a bad shot; no count is
+/// made up.
 fn counted(recording: &Recording) -> Result<Vec<Stood>> {
     let counts = recording.counts()?;
     let frames = recording.meta.frames.iter().zip(counts).enumerate();
@@ -237,14 +237,14 @@ impl Source for RecordingSource {
     }
 }
 
-/// Raw frames from a reader, each with its pose: as many frames as poses, those that are `missing` counted.
+/// Raw frames from a reader, each with its pose. There are as many poses as frames, including the `missing` ones.
 pub struct RawSource<R: Read> {
     frames: RawFrames<R>,
     readout: Option<Readout>,
     poses: Vec<Rigid<Base, Flange>>,
-    /// Numbers of the poses whose frame never came.
+    /// Indices of the poses whose frame never came.
     missing: BTreeSet<usize>,
-    /// Pose of the next frame.
+    /// Index of the next frame's pose.
     next: usize,
     ended: bool,
 }
@@ -266,12 +266,12 @@ impl<R: Read> RawSource<R> {
         Ok(RawSource { frames, readout: None, poses, missing, next: 0, ended: false })
     }
 
-    /// Takes a person's word for how its frames are read from the sensor.
+    /// Sets the readout from the sensor that the user stated.
     pub fn read_out_as(self, readout: Option<Readout>) -> RawSource<R> {
         RawSource { readout, ..self }
     }
 
-    /// Frames and poses do not go together: nobody knows which pose belongs to which frame.
+    /// The numbers of frames and poses differ, so it is unknown which pose belongs to which frame.
     fn uneven(&self, frames: String) -> Fault {
         let missing = match self.missing.len() {
             0 => String::new(),

@@ -1,5 +1,5 @@
-//! In: a station, a scene and the camera's pose in it. Out: the light that the sheet or the pointer
-//! sends into each pixel: beams are followed to the surface, once more by mirrors, and to the camera.
+//! In: a station, a scene and the camera's pose in it. Out: the light that the sheet or the pointer sends into each
+//! pixel. Beams are followed to the surface, from mirrors on to one more surface, and to the camera.
 //! Frame and unit: scene frame, mm; grey as share of full scale, before noise.
 
 use super::scene::{Hit, Scene};
@@ -13,7 +13,7 @@ impl Frame for InScene {
     const NAME: &'static str = "scene";
 }
 
-/// A grey picture in the making.
+/// A grey picture under construction.
 #[derive(Clone, Debug)]
 pub struct Canvas {
     /// Columns, px.
@@ -65,29 +65,29 @@ impl Canvas {
     }
 }
 
-/// One surface point on the middle of the sheet that the camera sees.
+/// One surface point on the middle of the sheet that is visible to the camera.
 #[derive(Clone, Copy, Debug)]
 pub struct LitPoint {
-    /// Scene frame.
+    /// Position in the scene frame, mm.
     pub point: Vec3,
-    /// Pixel.
+    /// Its column, px.
     pub u: f64,
     /// Its row, px.
     pub v: f64,
 }
 
-/// One moment: a station whose camera stands somewhere in a scene.
+/// One moment of the simulation: a station with its camera's pose in a scene.
 pub struct View<'a> {
     /// Camera, lasers and sensor.
     pub station: &'a Station,
-    /// What is lit.
+    /// The scene that is lit.
     pub scene: &'a Scene,
-    /// Where the camera stands, mm.
+    /// Pose of the camera in the scene, mm.
     pub scene_from_camera: Rigid<InScene, Camera>,
 }
 
 impl View<'_> {
-    /// Beyond this nothing is lit or seen, mm.
+    /// Beyond this distance nothing is lit or seen, mm.
     pub(super) fn far(&self) -> f64 {
         13.0 * self.station.working_distance
     }
@@ -96,7 +96,7 @@ impl View<'_> {
         (self.station.blur_px().powi(2) + 1.0 / 12.0).sqrt()
     }
 
-    /// The sheet's light in every pixel, and the visible points of its middle.
+    /// Adds the sheet's light to every pixel; returns the visible points of its middle.
     pub fn sheet(&self, canvas: &mut Canvas) -> Vec<LitPoint> {
         let (s, laser) = (self.station, &self.station.laser);
         let source = self.scene_from_camera.point(&laser.source);
@@ -138,7 +138,7 @@ impl View<'_> {
         middle
     }
 
-    /// The pointer's light; returns the middle of the spot where the camera sees it.
+    /// Adds the pointer's light; returns the middle of the spot if the camera sees it.
     pub fn spot(&self, canvas: &mut Canvas) -> Option<LitPoint> {
         let (s, pointer) = (self.station, &self.station.pointer);
         let source = self.scene_from_camera.point(&pointer.source);
@@ -168,7 +168,7 @@ impl View<'_> {
         middle
     }
 
-    /// Lets a beam's power fall on a surface, and the mirrored share of it on the next one.
+    /// Deposits a beam's power on a surface, and the mirrored share of it on the next surface.
     fn deposit(&self, canvas: &mut Canvas, hit: &Hit, direction: &Vec3, power: f64) -> Option<(f64, f64)> {
         let pixel = self.glow(canvas, hit, direction, power);
         let mirror = hit.material.mirror;
@@ -182,8 +182,8 @@ impl View<'_> {
         pixel
     }
 
-    /// What the lens collects of the light that a lit point throws back: albedo (and gloss) times the
-    /// cosine at the surface, times the lens's solid angle.
+    /// Light of a lit point that the lens collects: albedo (and gloss) times the cosine at the surface, times the
+    /// lens's solid angle.
     fn glow(&self, canvas: &mut Canvas, hit: &Hit, direction: &Vec3, power: f64) -> Option<(f64, f64)> {
         let eye = self.scene_from_camera.translation;
         let way = eye - hit.point;
@@ -225,7 +225,7 @@ impl View<'_> {
         s.sensor.laser_white * (2.0 * std::f64::consts::PI).sqrt() * sigma * z * z / angle_per_column
     }
 
-    /// The same for the pointer's spot: energy = peak · 2π · σ².
+    /// The same scale for the pointer's spot: energy = peak · 2π · σ².
     fn spot_gain(&self) -> f64 {
         let s = self.station;
         let z = s.working_distance;
@@ -250,8 +250,8 @@ mod tests {
         Scene::new(SceneSpec::parse(&text).unwrap()).unwrap()
     }
 
-    /// The light's centroid in a column is where the plane of the sheet meets the plate, as the lens
-    /// shows it: worked out here by the camera's own equations, without following beams.
+    /// The light's centroid in a column is where the plane of the sheet meets the plate, as the lens images it. The
+    /// test computes it from the camera's own equations, without following beams.
     #[test]
     fn the_stripe_lies_where_the_sheet_meets_the_plate() {
         for (seed, tilt) in [(0, 0.0), (3, 8.0), (11, -10.0)] {
@@ -274,7 +274,7 @@ mod tests {
                 let p = ray.meet(&station.laser.plane()).unwrap();
                 worst = worst.max(scene.distance(&scene_from_camera.point(&p)));
             }
-            // 2 µm at 155 mm is 0.008 px: what is left is the beam's change of width over its own depth.
+            // 2 µm at 155 mm is 0.008 px: the remainder is the beam's change of width over its own depth.
             assert!(worst < 0.002, "seed {seed}: {worst} mm");
         }
     }
@@ -309,7 +309,7 @@ mod tests {
         let view =
             View { station: &station, scene: &scene, scene_from_camera: above(0.0, 0.0, station.working_distance) };
         let lit = view.sheet(&mut Canvas::new(640, 480));
-        // The laser stands at -y of the scene: the wall keeps its light from the floor behind it.
+        // The laser is on the -y side of the scene: the wall keeps its light from the floor behind it.
         let floor =
             |x0: f64, x1: f64| lit.iter().filter(|p| p.point.z < 0.1 && p.point.x > x0 && p.point.x < x1).count();
         assert!(floor(15.0, 30.0) > 50 && floor(-9.0, 9.0) == 0, "{} {}", floor(15.0, 30.0), floor(-9.0, 9.0));

@@ -1,5 +1,5 @@
-//! In: a scene file, a design, a seed. Out: recordings of a station whose truth is known: pictures,
-//! poses, calibration and the exact surface to measure errors against.
+//! In: a scene file, a design, a seed. Out: recordings of a station whose truth is known: pictures, poses,
+//! calibration, and the exact surface for measuring errors.
 //! Frame and unit: scene, base, flange, camera, part; mm. Independent of the scanner: it never reads a peak.
 
 mod light;

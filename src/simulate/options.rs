@@ -1,5 +1,5 @@
-//! In: nothing. Out: what can be simulated: sets of recordings, a design, a scene, noise; within which limits.
-//! Frame and unit: px, mm, degrees; each field says.
+//! In: nothing. Out: the options of a simulation with their limits: sets of recordings, a design, a scene, noise.
+//! Frame and unit: px, mm, degrees; stated at each field.
 
 use super::rig::RigSpec;
 use super::sensor::Sensor;
@@ -16,7 +16,7 @@ use std::path::PathBuf;
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Set {
-    /// The sheet passed over the scene.
+    /// The sheet of light passes over the scene.
     Scan,
     /// A chessboard in many poses, for the camera.
     Intrinsics,
@@ -26,19 +26,19 @@ pub enum Set {
     Laserplane,
     /// The pointer's spot on a chessboard in many poses.
     PointerCal,
-    /// The pointer's spot on a plate across the optical axis, through its range.
+    /// The pointer's spot on a plate across the optical axis, throughout the pointer's range.
     Pointer,
     /// The pointer's spot on the scene from several robot poses, for the surface normal.
     Surface,
-    /// A chessboard that rides on the axis, at several of its stops.
+    /// A chessboard that rides on the axis, at several of the axis' stops.
     Axis,
 }
 
 impl Set {
-    /// Those of a robot's station; one with an axis has [`Set::Axis`] beside them.
+    /// The sets of a robot's station; a station with an axis has [`Set::Axis`] in addition.
     pub const ALL: [Set; 7] =
         [Set::Scan, Set::Intrinsics, Set::Handeye, Set::Laserplane, Set::PointerCal, Set::Pointer, Set::Surface];
-    /// As options, folders and files write it.
+    /// The name used in options, folders and files.
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -54,31 +54,32 @@ pub const DEFAULT_SCENE: &str = include_str!("../../data/scenes/board.toml");
 /// What to simulate.
 #[derive(Clone, Debug)]
 pub struct SimulateOptions {
-    /// What to record, 1..=100 of them.
+    /// Sets to record, 1..=100 of them.
     pub sets: Vec<Set>,
-    /// The design that stations are built after; the paper's when not given.
+    /// The design that stations are built to; the paper's if not given.
     pub rig: Option<RigSpec>,
-    /// A scene file; when not given the built-in board with parts, or for a named rig what fits into its field.
+    /// A scene file. If not given, the built-in board with parts, or for a named rig a scene that fits into its
+    /// field.
     pub scene: Option<PathBuf>,
-    /// The calibration board of all sets that show one; chessboards of our own choice when not given.
+    /// The calibration board of all sets that show one; built-in chessboards if not given.
     pub board: Option<BoardSpec>,
-    /// 0 is the design itself, every other number another specimen, scene pose and noise.
+    /// 0 is the design itself; every other number gives another specimen, scene pose and noise.
     pub seed: u64,
-    /// Sensor size, px, 64..=8192 each.
+    /// Columns of the sensor, px, 64..=8192.
     pub width: u32,
-    /// Rows, px.
+    /// Rows of the sensor, px, 64..=8192.
     pub height: u32,
-    /// What turns light into grey levels.
+    /// Conversion of light into grey levels.
     pub sensor: Sensor,
     /// Shots of a scan, 2..=100000.
     pub shots: usize,
-    /// An axis moves the parts past the sensor, which stands still; `None`: a robot moves the sensor.
+    /// The axis that moves the parts past the fixed sensor; `None`: a robot moves the sensor.
     pub motion: Option<AxisKind>,
-    /// Where the robot stands for each shot of a scan or of the pointer on the scene, instead of places of our choice.
+    /// Robot poses for the shots of a scan or of the pointer on the scene; chosen by the simulation if not given.
     pub poses: Option<Vec<Rigid<Base, Flange>>>,
-    /// Errors of the reported robot poses, 1 sigma per axis, mm 0..=10 and degrees 0..=5.
+    /// Position error of the reported robot poses, 1 sigma per axis, mm, 0..=10.
     pub pose_noise_mm: f64,
-    /// Orientation, 1 sigma per axis, degrees, 0..=5.
+    /// Orientation error of the reported robot poses, 1 sigma per axis, degrees, 0..=5.
     pub pose_noise_deg: f64,
 }
 
@@ -89,7 +90,7 @@ impl Default for SimulateOptions {
 }
 
 impl SimulateOptions {
-    /// A scan by a rig as it was designed.
+    /// A scan by a rig exactly as designed.
     pub fn of(rig: RigSpec) -> SimulateOptions {
         SimulateOptions {
             sets: vec![Set::Scan],
@@ -108,7 +109,7 @@ impl SimulateOptions {
         }
     }
 
-    /// Refuses values out of the ranges that the fields state, and options that do not go together.
+    /// Refuses values outside the ranges that the fields state, and options that contradict each other.
     pub fn check(&self) -> Result<()> {
         self.sensor.check()?;
         let limits = [

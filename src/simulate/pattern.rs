@@ -1,13 +1,13 @@
-//! In: a board description and a place on it. Out: whether that place is printed black.
+//! In: a board description and a position on the board. Out: whether that position is printed black.
 //! Frame and unit: board frame (recording::BoardSpec), mm.
 
 use crate::fault::Result;
 use crate::recording::{BoardSpec, Markers};
 
-/// A board as it is printed.
+/// A printed board.
 #[derive(Clone, Debug)]
 pub struct Pattern {
-    /// The description that it was made of.
+    /// The description that the pattern was made from.
     pub board: BoardSpec,
     markers: Option<Markers>,
     /// Centres of the dots of a circle grid.
@@ -23,7 +23,7 @@ impl Pattern {
         Ok(Pattern { board: board.clone(), markers: Markers::of(board)?, dots })
     }
 
-    /// True where the print is black.
+    /// Whether the print is black at a position.
     pub fn is_black(&self, x: f64, y: f64) -> bool {
         match &self.board {
             BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm: s, first_square, .. } => {

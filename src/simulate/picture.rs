@@ -23,15 +23,15 @@ impl View<'_> {
         (hit.material.albedo * shade * along.z.powi(4)) as f32
     }
 
-    /// Viewing directions at the corners between pixels, one row of them.
+    /// Viewing directions at the corners between pixels, along one row of corners.
     fn corners(&self, row: u32) -> Vec<Option<Vec2>> {
         let camera = &self.station.camera;
         let v = f64::from(row) - 0.5;
         (0..=camera.width).map(|x| camera.normalised_from_pixel(&Vec2::new(f64::from(x) - 0.5, v))).collect()
     }
 
-    /// Room light in every pixel with `samples`² rays a pixel, blurred by the lens. Within a pixel the
-    /// lens is straight to 1e-6 px, so the rays lie between those of its corners.
+    /// Room light in every pixel with `samples`² rays a pixel, blurred by the lens. Within a pixel the lens
+    /// distortion is linear to 1e-6 px, so the rays are interpolated between those of its corners.
     pub fn ambient(&self, samples: u32) -> Canvas {
         let camera = &self.station.camera;
         let mut canvas = Canvas::new(camera.width, camera.height);
@@ -55,8 +55,8 @@ impl View<'_> {
         canvas
     }
 
-    /// Room light from one ray every few pixels, interpolated: enough for the faint leak through a
-    /// laser's filter.
+    /// Room light from one ray every few pixels, interpolated: accurate enough for the faint leak through a laser's
+    /// filter.
     pub fn faint_ambient(&self) -> Canvas {
         let camera = &self.station.camera;
         let step = (camera.width / 160).max(1);
@@ -107,14 +107,15 @@ pub fn blur(canvas: &mut Canvas, sigma: f64) {
     }
 }
 
-/// A speckle contrast below this changes no level of 16 bits, and the Gamma distribution's shape leaves what f32 holds.
+/// A speckle contrast below this changes no level of 16 bits, and the Gamma distribution's shape exceeds the range
+/// of f32.
 const FAINTEST_SPECKLE: f64 = 1e-6;
 
-/// What coherent light is multiplied by: Gamma distributed, of mean one [goodman07, 4.6].
+/// The factor that multiplies coherent light: Gamma distributed, of mean one [goodman07, 4.6].
 enum Speckle {
-    /// Each pixel's is its own.
+    /// Each pixel has an independent factor.
     Pixels(Gamma<f32>),
-    /// Grains: correlated normal numbers, a pixel each, and the Gamma distribution's shape.
+    /// Grains: correlated normal numbers, one a pixel, and the Gamma distribution's shape.
     Grains(Vec<f32>, f32),
 }
 
@@ -143,7 +144,7 @@ impl Speckle {
     }
 }
 
-/// Turns light (share of full scale) into grey levels. `laser` has speckle, `room` has none.
+/// Converts light (share of full scale) into grey levels. `laser` has speckle, `room` has none.
 pub fn expose(
     sensor: &Sensor,
     laser: &Canvas,
@@ -184,7 +185,7 @@ mod tests {
     use super::*;
     use rand::SeedableRng;
 
-    /// Contrast as stated, and neighbours correlated as light through a blur is: exp(-d² / (4 s²)).
+    /// The contrast is the stated one, and neighbours are correlated as light through a blur is: exp(-d² / (4 s²)).
     #[test]
     fn speckle_has_the_stated_contrast_and_grains() {
         for (speckle, grain_px) in [(0.12, 0.0), (0.12, 1.5), (0.4, 0.8), (0.4, 2.5)] {

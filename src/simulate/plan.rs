@@ -1,4 +1,4 @@
-//! In: a station, a scene or board, a seed. Out: where the robot stands for each picture of a recording.
+//! In: a station, a scene or board, a seed. Out: the robot's pose for each picture of a recording.
 //! Frame and unit: base, flange, camera, board, scene; mm. Every pose is reproducible from the seed.
 
 use super::light::InScene;
@@ -12,7 +12,7 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
-/// Where the scene stands before the robot: turned by up to 15 degrees, tilted by up to 2.
+/// Pose of the scene before the robot: turned by up to 15 degrees, tilted by up to 2.
 pub fn base_from_scene(station: &Station) -> Rigid<Base, InScene> {
     let mut rng = station.rng("base_from_scene", 0);
     let mut within = |by: f64| rng.random_range(-by..by);
@@ -21,14 +21,14 @@ pub fn base_from_scene(station: &Station) -> Rigid<Base, InScene> {
     Rigid::new(tilt * turn, Vec3::new(460.0 + within(30.0), -100.0 + within(30.0), 65.0 + within(20.0)))
 }
 
-/// Camera above a place of the scene, looking straight down, image x along the scene's x.
+/// Camera above a point of the scene, looking straight down, image x along the scene's x.
 pub fn above(x: f64, y: f64, z: f64) -> Rigid<InScene, Camera> {
     Rigid::new(Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0)), Vec3::new(x, y, z))
 }
 
-/// A straight pass over the scene's region along y in equal steps, from the side that the laser stands on. The sheet
-/// meets the scene's focus height at the working distance; the pass is longer than the region by what the heights
-/// shift it.
+/// A straight pass over the scene's region along y in equal steps, starting on the laser's side. The sheet meets the
+/// scene's focus height at the working distance. The pass is longer than the region by the shift that the heights
+/// cause.
 pub fn scan(station: &Station, scene: &Scene, shots: usize) -> Vec<Rigid<InScene, Camera>> {
     let [x0, y0, x1, y1] = scene.spec.region_mm;
     let (rig, laser) = (&station.rig, &station.laser);
@@ -36,7 +36,8 @@ pub fn scan(station: &Station, scene: &Scene, shots: usize) -> Vec<Rigid<InScene
     let turn = exp(&(Vec3::z() * (90f64.to_radians() - side)));
     let lean = exp(&(Vec3::x() * -rig.working.lean_deg.to_radians()));
     let rotation = lean * Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0)) * turn;
-    // Where the fan's middle is at the working distance, towards the laser; on the axis unless the rig says otherwise.
+    // Position of the fan's middle at the working distance, measured towards the laser; it is on the axis unless the
+    // rig states otherwise.
     let z = station.working_distance;
     let along = (laser.source + laser.axis * ((z - laser.source.z) / laser.axis.z))
         .xy()
@@ -52,7 +53,7 @@ pub fn scan(station: &Station, scene: &Scene, shots: usize) -> Vec<Rigid<InScene
         .collect()
 }
 
-/// Five places of the scene's region, seen by the pointer from the working distance with a slight tilt.
+/// Five points of the scene's region, seen by the pointer from the working distance with a slight tilt.
 pub fn surface_views(station: &Station, scene: &Scene) -> Vec<Rigid<InScene, Camera>> {
     let [x0, y0, x1, y1] = scene.spec.region_mm;
     let at = |fx: f64, fy: f64| (x0 + fx * (x1 - x0), y0 + fy * (y1 - y0));
@@ -63,7 +64,7 @@ pub fn surface_views(station: &Station, scene: &Scene) -> Vec<Rigid<InScene, Cam
         .map(|(i, &(fx, fy))| {
             let (x, y) = at(fx, fy);
             let z = station.working_distance * (0.95 + 0.03 * i as f64);
-            // Where the beam is at that depth, so that the spot and not the axis meets the place.
+            // Position of the beam at that depth, so that the spot and not the axis meets the point.
             let spot = beam.at((z - beam.origin.z) / beam.direction.z);
             above(x - spot.x, y + spot.y, z)
         })
@@ -75,7 +76,7 @@ pub fn flange(station: &Station, base_from_camera: &Rigid<Base, Camera>) -> Rigi
     *base_from_camera * station.flange_from_camera.inverse()
 }
 
-/// What the robot reports: the true pose with an independent error of `mm` and `deg`, 1 sigma per axis.
+/// The pose that the robot reports: the true pose with an independent error of `mm` and `deg`, 1 sigma per axis.
 pub fn reported(pose: &Rigid<Base, Flange>, mm: f64, deg: f64, rng: &mut Pcg64) -> Rigid<Base, Flange> {
     let mut normal = |sigma: f64| {
         let n: f64 = StandardNormal.sample(rng);
@@ -86,25 +87,25 @@ pub fn reported(pose: &Rigid<Base, Flange>, mm: f64, deg: f64, rng: &mut Pcg64) 
     Rigid::new(exp(&Vec3::from(w)) * pose.rotation, pose.translation + Vec3::from(t))
 }
 
-/// What is asked of the pose of a board before the camera.
+/// Requirements for the poses of a board before the camera.
 #[derive(Clone, Copy, Debug)]
 pub struct Views {
-    /// How many poses.
+    /// Number of poses.
     pub count: usize,
-    /// Distance of the board's middle, mm.
+    /// Smallest distance of the board's middle, mm.
     pub near: f64,
     /// Largest distance of the board's middle, mm.
     pub far: f64,
     /// Largest tilt out of the image plane, degrees.
     pub tilt_deg: f64,
-    /// Largest turn in the image plane, degrees.
+    /// Largest rotation in the image plane, degrees.
     pub turn_deg: f64,
-    /// Share of the features that must be in the picture: 1 unless markers tell the corners apart.
+    /// Share of the features that must be in the picture: 1 unless markers identify the corners.
     pub seen: f64,
 }
 
-/// Whether a beam falls on a board where it can be measured: inside the picture, the sheet's middle well inside the
-/// plate, the pointer on an even patch, because print under the spot moves its centroid.
+/// Whether a beam falls on a board where it can be measured: inside the picture, with the sheet's middle well inside
+/// the plate. The pointer must meet an evenly printed patch, because a print edge under the spot moves its centroid.
 fn useful(station: &Station, board: &Pattern, pose: &Rigid<Camera, Board>, beam: Beam) -> bool {
     let plane = pose.plane(&Plane::<Board>::new(Vec3::z(), 0.0).expect("unit normal"));
     let ray = match beam {
@@ -129,7 +130,7 @@ fn useful(station: &Station, board: &Pattern, pose: &Rigid<Camera, Board>, beam:
 /// Board poses that cover the image and the range of tilts; rejection sampling, seeded.
 ///
 /// # Errors
-/// Where a board does not fit into the picture in the range of distances and tilts.
+/// A board that does not fit into the picture within the range of distances and tilts.
 pub fn board_views(
     station: &Station,
     board: &BoardSpec,
@@ -143,15 +144,15 @@ pub fn board_views(
     let camera = &station.camera;
     let (w, h) = (f64::from(camera.width), f64::from(camera.height));
     let edge = 0.02 * w;
-    // A board's long side lies along the picture's.
+    // The board's long side lies along the picture's.
     let upright = if h > w { 90f64.to_radians() } else { 0.0 };
     let inside = |p: Vec3| {
         camera.pixel_from_point(&p).is_some_and(|q| q.x > edge && q.y > edge && q.x < w - edge && q.y < h - edge)
     };
     let view = |i: usize| {
         let mut rng = station.rng(purpose, i as u64);
-        // The picture's middle third is left a little as the tries go on, so that a board that
-        // only just fits is still placed.
+        // The poses spread less about the picture's middle as the attempts go on, so that a board that barely fits
+        // is still placed.
         (0..20_000).find_map(|attempt| {
             let spread = 1.0 - f64::from(attempt) / 20_000.0;
             let mut within = |by: f64| rng.random_range(-by..=by);

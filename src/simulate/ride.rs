@@ -1,5 +1,5 @@
-//! In: a station, what moves the parts past it, a scene. Out: the true axis, the counts of a scan, where the camera
-//! stands over the scene at a count, and a board that rides along.
+//! In: a station, the axis that moves the parts past it, a scene. Out: the true axis, the counts of a scan, the
+//! camera's pose over the scene at a count, and a board that rides along.
 //! Frame and unit: camera, axis (docs/conventions.md), scene, board; mm, counts.
 
 use super::light::InScene;
@@ -11,36 +11,37 @@ use crate::geometry::{Axis, AxisKind, Base, Board, Camera, CountUnit, Mat3, Ridi
 use crate::recording::{BoardSpec, Carries, Motion, MotionKind};
 use rand::Rng;
 
-/// A part's way past a sensor that stands still.
+/// A part's motion past a fixed sensor.
 #[derive(Clone, Debug)]
 pub struct Ride {
-    /// The true one, camera frame.
+    /// The true axis, camera frame.
     pub axis: Axis,
-    /// Where the scene stands at count 0.
+    /// Pose of the scene at count 0.
     camera_from_scene: Rigid<Camera, InScene>,
-    /// Of a scan's shots.
+    /// Counts of a scan's shots.
     pub counts: Vec<f64>,
     camera_from_board: Rigid<Camera, Board>,
 }
 
-/// Stops of the board that the axis is calibrated from.
+/// Number of the board's stops that the axis is calibrated from.
 const STOPS: usize = 14;
-/// Degrees by which an axis is out of true, at most, and its encoder's steps a pixel footprint.
+/// Largest misalignment of an axis, degrees.
 const ASKEW_DEG: f64 = 1.5;
+/// Encoder steps of a linear axis in a pixel footprint.
 const STEPS: f64 = 40.0;
-/// Encoder counts a turn of a turntable.
+/// Encoder counts per turn of a turntable.
 const TURN: f64 = 36_000.0;
 
 impl Ride {
-    /// One pass of an axis over the scene's region in `shots`, or one turn about the scene's origin. Another axis for
-    /// every seed.
+    /// One pass of an axis over the scene's region in `shots`, or one turn about the scene's origin. Every seed
+    /// gives another axis.
     pub fn new(kind: AxisKind, station: &Station, scene: &Scene, board: &BoardSpec, shots: usize) -> Ride {
         let mut rng = station.rng("ride", kind as u64);
         let mut within = |by: f64| if station.seed == 0 { 0.0 } else { rng.random_range(-by..=by) };
         let askew = ASKEW_DEG.to_radians();
         let scale = station.rig.scale();
         let cameras = plan::scan(station, scene, if kind == AxisKind::Linear { shots } else { 3 });
-        // A turntable's sheet lies across its axis.
+        // A turntable's sheet passes through its axis.
         let first = if kind == AxisKind::Linear { cameras[0] } else { cameras[1] };
         let camera_from_scene = first.inverse();
         let (unit, steps) = (CountUnit::Count, (shots.max(2) - 1) as f64);
@@ -68,12 +69,12 @@ impl Ride {
         Ride { axis, camera_from_scene, counts, camera_from_board }
     }
 
-    /// Where the camera stands over the scene at a count.
+    /// Pose of the camera over the scene at a count.
     pub fn scene_from_camera(&self, count: f64) -> Rigid<InScene, Camera> {
         (self.axis.moved(count) * self.camera_from_scene).inverse()
     }
 
-    /// Where the camera stands over the board that rides along, at a count.
+    /// Pose of the camera over the riding board at a count.
     pub fn board_from_camera(&self, count: f64) -> Rigid<Board, Camera> {
         (self.axis.moved(count) * self.camera_from_board).inverse()
     }
@@ -84,7 +85,7 @@ impl Ride {
         Rigid::new(axis_from_scene.rotation, axis_from_scene.translation)
     }
 
-    /// What meta.json says of it.
+    /// The motion as meta.json states it.
     pub fn motion(&self) -> Motion {
         let kind = match self.axis.kind {
             AxisKind::Linear => MotionKind::Linear,
@@ -93,10 +94,10 @@ impl Ride {
         Motion { kind, carries: Carries::Part, unit: Some(self.axis.unit), ..Motion::default() }
     }
 
-    /// Stops at which the whole board is in the picture, unevenly apart, and how it stands there.
+    /// Unevenly spaced stops at which the whole board is in the picture, with the board's pose at each.
     ///
     /// # Errors
-    /// Where it is in view at fewer than half of the stops that are looked for.
+    /// A board that is in view at fewer than half of the intended stops.
     pub fn stops(&self, station: &Station, board: &BoardSpec) -> Result<Vec<(f64, Rigid<Camera, Board>)>> {
         let features = board.features();
         let (w, h) = (f64::from(station.camera.width), f64::from(station.camera.height));
@@ -112,7 +113,7 @@ impl Ride {
             AxisKind::Linear => station.rig.footprint_mm() / self.axis.pitch,
             AxisKind::Turntable => TURN / 720.0,
         };
-        // Half a turn, or as far as a picture is wide.
+        // Half a turn, or as many steps as the picture is wide.
         let farthest =
             if self.axis.kind == AxisKind::Linear { station.camera.width.max(station.camera.height) } else { 360 };
         let reach = |sign: f64| {
@@ -137,8 +138,8 @@ impl Ride {
     }
 }
 
-/// The board at count 0: on the table where the camera looks, on a turntable about its axis; tilted a little, as on a
-/// wedge.
+/// Pose of the board at count 0: on the table where the camera looks, on a turntable at its axis; slightly tilted,
+/// as on a wedge.
 fn lying(
     station: &Station,
     board: &BoardSpec,
@@ -148,7 +149,7 @@ fn lying(
 ) -> Rigid<Camera, Board> {
     let features = board.features();
     let middle = features.iter().sum::<Vec3>() / features.len() as f64;
-    // The board's z leads into it, the scene's up.
+    // The board's z points into the board, the scene's z points up.
     let level = camera_from_scene.rotation * Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0));
     let tilt = exp(&Vec3::new(0.15 + 0.5 * tilt_x, -0.1 + 0.5 * tilt_y, 0.0));
     let rotation = level * exp(&Vec3::new(0.0, 0.0, turn)) * tilt;

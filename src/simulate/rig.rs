@@ -1,40 +1,40 @@
-//! In: a rig file (TOML): the design of a camera with a sheet of light on a robot. Out: the same, checked, and the
-//! lengths that follow from it: pixel footprint, stripe length, distances of boards.
+//! In: a rig file (TOML): the design of a camera with a sheet of light on a robot. Out: the checked design, and the
+//! lengths derived from it: pixel footprint, stripe length, distances of boards.
 //! Frame and unit: camera frame, mm, degrees, px; each key shows its unit, docs/file-formats.md, Rig file.
 
 use super::sensor::Sensor;
 use crate::fault::{Fault, Result};
 use std::path::Path;
 
-/// What the paper's rig sees at its working distance, mm: the lengths that scenes and boards are stated for.
+/// Field of the paper's rig at its working distance, mm: scenes and boards are stated for these lengths.
 const PAPER_FIELD_MM: [f64; 2] = [162.2, 121.65];
 
-/// Rounded to three significant digits, as sizes are that people choose.
+/// Rounds to three significant digits, like sizes that people choose.
 pub fn three_digits(x: f64) -> f64 {
     let unit = 10f64.powi(x.abs().max(1e-12).log10().floor() as i32 - 2);
-    // A decimal literal's own value, where dividing by its unit would leave the last bit off.
+    // Parsing the decimal text gives the exact literal; multiplying by the unit would leave the last bit off.
     format!("{:.12}", (x / unit).round() * unit).parse().expect("a number")
 }
 
-/// A design. A specimen of it is a [`super::Station`].
+/// A design. [`super::Station`] is a specimen of it.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RigSpec {
-    /// Of the design; can be part of a file's name.
+    /// Name of the design; can be part of a file's name.
     pub name: String,
     /// Camera and lens.
     pub camera: CameraSpec,
-    /// What turns light into grey levels; [`Sensor::default`] unless stated.
+    /// Conversion of light into grey levels; [`Sensor::default`] unless stated.
     #[serde(default)]
     pub sensor: Sensor,
     /// The sheet of light.
     pub laser: LaserSpec,
-    /// Where it works.
+    /// Depths that it works at.
     pub working: WorkingSpec,
-    /// The camera on the flange; [`MountSpec::default`] unless stated.
+    /// Mount of the camera on the flange; [`MountSpec::default`] unless stated.
     #[serde(default)]
     pub mount: MountSpec,
-    /// Without it the default rig's pointer, scaled with the working distance.
+    /// The pointer; if not stated, the default rig's, scaled with the working distance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pointer: Option<PointerSpec>,
 }
@@ -43,9 +43,9 @@ pub struct RigSpec {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraSpec {
-    /// Sensor size, px, 64..=8192 each.
+    /// Columns of the sensor, px, 64..=8192.
     pub width_px: u32,
-    /// Rows, px, 64..=8192.
+    /// Rows of the sensor, px, 64..=8192.
     pub height_px: u32,
     /// Edge of a pixel, 0.5..=50 µm.
     pub pixel_um: f64,
@@ -59,18 +59,18 @@ pub struct CameraSpec {
     pub sensor_tilt_deg: [f64; 2],
 }
 
-/// A line laser as designed: where it stands and how its sheet of light spreads.
+/// A line laser as designed: its pose and the spread of its sheet of light.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LaserSpec {
-    /// Between the fan's middle and the optical axis, 3..=80 degrees.
+    /// Angle between the fan's middle and the optical axis, 3..=80 degrees.
     pub angle_deg: f64,
-    /// Side of the camera that the laser stands on, as seen in the picture: 0 right, 90 below, 180 left, 270 above;
-    /// the stripe runs across this direction. -360..=360.
+    /// Direction from the camera to the laser, as seen in the picture: 0 right, 90 below, 180 left, 270 above; the
+    /// stripe runs across this direction. -360..=360.
     pub side_deg: f64,
     /// Distance of the laser's source from the optical axis, 1..=5000 mm.
     pub baseline_mm: f64,
-    /// Where the sheet crosses the optical axis, mm; the working distance unless stated.
+    /// Depth at which the sheet crosses the optical axis, mm; the working distance unless stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crosses_axis_at_mm: Option<f64>,
     /// Full opening of the fan, 1..=120 degrees.
@@ -79,31 +79,31 @@ pub struct LaserSpec {
     pub waist_radius_mm: f64,
     /// ... which lies this far from the source, 1..=20000 mm.
     pub waist_at_mm: f64,
-    /// 300..=1100 nm.
+    /// Wavelength, 300..=1100 nm.
     pub wavelength_nm: f64,
 }
 
-/// Where a design works: depths along the camera's optical axis.
+/// Working volume of a design: depths along the camera's optical axis.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WorkingSpec {
-    /// Camera depth that scans are taken at, 1..=20000 mm.
+    /// Camera depth of scans, 1..=20000 mm.
     pub distance_mm: f64,
-    /// Camera depths between which boards and parts stand, mm; near <= distance <= far.
+    /// Nearest camera depth of boards and parts, mm; near <= distance <= far.
     pub near_mm: f64,
-    /// Farthest depth of boards and parts, mm, up to 20000.
+    /// Farthest camera depth of boards and parts, mm, up to 20000.
     pub far_mm: f64,
-    /// How far the camera leans away from the laser during a scan, -80..=80 degrees: at the laser's angle the sheet is
-    /// upright. The sheet still meets the scene where it met the axis.
+    /// Angle by which the camera leans away from the laser during a scan, -80..=80 degrees: at the laser's angle the
+    /// sheet is upright. The sheet still meets the scene at the point where it met the axis.
     #[serde(default)]
     pub lean_deg: f64,
 }
 
-/// The camera on the flange.
+/// Pose of the camera on the flange.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MountSpec {
-    /// Turn about the optical axis, -360..=360 degrees.
+    /// Rotation about the optical axis, -360..=360 degrees.
     pub turn_deg: f64,
     /// Camera centre in the flange frame, -2000..=2000 mm each.
     pub at_mm: [f64; 3],
@@ -119,24 +119,24 @@ impl Default for MountSpec {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PointerSpec {
-    /// Camera frame, mm: where the beam leaves and a place that it passes.
+    /// Point where the beam leaves, camera frame, mm.
     pub source_mm: [f64; 3],
-    /// A place that the beam passes, camera frame, mm; farther than the source in z.
+    /// A point that the beam passes, camera frame, mm; its z is larger than the source's.
     pub aim_mm: [f64; 3],
-    /// 1/e² radius at the waist, 0.001..=20 mm, which lies this far from the source, 1..=20000 mm.
+    /// 1/e² radius at the waist, 0.001..=20 mm.
     pub waist_radius_mm: f64,
     /// Distance of the waist from the source, 1..=20000 mm.
     pub waist_at_mm: f64,
-    /// 300..=1100 nm.
+    /// Wavelength, 300..=1100 nm.
     pub wavelength_nm: f64,
-    /// Camera depths that it measures between, mm.
+    /// Nearest camera depth that it measures, mm.
     pub near_mm: f64,
-    /// Farthest depth that it measures, mm, up to 20000.
+    /// Farthest camera depth that it measures, mm, up to 20000.
     pub far_mm: f64,
 }
 
 impl RigSpec {
-    /// The rig that is simulated when no other is named.
+    /// The rig that is simulated if no other is named.
     pub fn paper() -> RigSpec {
         RigSpec::parse(include_str!("../../data/rigs/paper.toml")).expect("ships with the program")
     }
@@ -162,7 +162,7 @@ impl RigSpec {
         Ok(rig)
     }
 
-    /// Refuses values out of the ranges that the fields state.
+    /// Refuses values outside the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         crate::files::named("name", &self.name)?;
         self.sensor.check()?;
@@ -215,7 +215,7 @@ impl RigSpec {
     pub fn crossing(&self) -> f64 {
         self.laser.crosses_axis_at_mm.unwrap_or(self.working.distance_mm)
     }
-    /// What a pixel sees at the working distance, mm.
+    /// Size that a pixel covers at the working distance, mm.
     pub fn footprint_mm(&self) -> f64 {
         self.working.distance_mm / self.focal_px()
     }
@@ -223,8 +223,8 @@ impl RigSpec {
     pub fn field_mm(&self) -> [f64; 2] {
         [self.camera.width_px, self.camera.height_px].map(|n| f64::from(n) * self.footprint_mm())
     }
-    /// The pointer; where the file names none, the default rig's: beside the camera in the scale of the field, aimed in
-    /// the scale of the distance.
+    /// The pointer. If the file states none, it is the default rig's: its offset from the camera scales with the
+    /// field, its depths scale with the distance.
     pub fn pointer_spec(&self) -> PointerSpec {
         let (far, wide) = (self.working.distance_mm / 155.0, self.board_scale());
         self.pointer.unwrap_or(PointerSpec {
@@ -237,7 +237,7 @@ impl RigSpec {
             far_mm: self.working.far_mm,
         })
     }
-    /// Length of the stripe that picture and fan show through the middle at the working distance, mm.
+    /// Length of the stripe through the middle at the working distance, limited by picture and fan, mm.
     pub fn stripe_mm(&self) -> f64 {
         let (s, c) = self.laser.side_deg.to_radians().sin_cos();
         let [w, h] = self.field_mm();
@@ -246,22 +246,22 @@ impl RigSpec {
         // The stripe runs along (-s, c).
         (w / s.abs().max(1e-9)).min(h / c.abs().max(1e-9)).min(fan)
     }
-    /// Lengths of the scene over those that the paper's rig sees, to three digits.
+    /// Ratio of the scene's lengths to those that the paper's rig sees, to three digits.
     pub fn scale(&self) -> f64 {
         three_digits(self.stripe_mm() / PAPER_FIELD_MM[0])
     }
-    /// The same for boards, which have to come into the picture whole.
+    /// The same ratio for boards, which have to fit into the picture completely.
     pub fn board_scale(&self) -> f64 {
         let [w, h] = self.field_mm();
         three_digits((w.max(h) / PAPER_FIELD_MM[0]).min(w.min(h) / PAPER_FIELD_MM[1]))
     }
-    /// Where boards stand when `wanted` (shares of the working distance) is asked for: within the working volume.
+    /// Distances of boards for the range `wanted` (shares of `distance`), clamped to the working volume.
     pub fn board_distances(&self, wanted: [f64; 2], distance: f64) -> [f64; 2] {
         let (low, high) = (self.working.near_mm, self.working.far_mm);
         let near = (wanted[0] * distance).clamp(low, (low + high) / 2.0);
         [near, (wanted[1] * distance).clamp(near, high)]
     }
-    /// Shots for steps of one and a half pixel footprints over so many mm.
+    /// Number of shots for steps of one and a half pixel footprints over a length.
     pub fn shots_over(&self, length_mm: f64) -> usize {
         (length_mm / (1.5 * self.footprint_mm())).ceil().max(2.0) as usize
     }

@@ -1,15 +1,16 @@
-//! In: a rig's design. Out: a scene that fills its field: a stepped block beside a plate with a notch, a window and a
-//! hole, and the recipe that finds that plate.
-//! Frame and unit: scene frame, z up, the laser on the side of -y; mm. Lengths of the default rig times its scale.
+//! In: a rig's design. Out: a scene that fills its field, and the recipe that finds the plate in it. The scene is a
+//! stepped block beside a plate with a notch, a window and a hole.
+//! Frame and unit: scene frame, z up, the laser on the -y side; mm. Lengths are the default rig's times the rig's
+//! scale.
 
 use super::rig::RigSpec;
 use super::scene::{CutSpec, Material, PartSpec, SceneSpec, ShapeSpec, SolidSpec};
 
 /// Rises from tread to tread on the default rig, mm.
 pub const STEPS_MM: [f64; 4] = [0.1, 0.5, 1.0, 5.0];
-/// Treads are so wide (along the stripe) and long on the default rig, mm.
+/// Width (along the stripe) and length of a tread on the default rig, mm.
 pub const TREAD_MM: [f64; 2] = [12.0, 24.0];
-/// Top of the plate that everything stands on, and of the notched part above it.
+/// Height of the plate that everything stands on, and the notched part's thickness, mm.
 const FLOOR_MM: f64 = -6.0;
 const PART_MM: f64 = 5.0;
 
@@ -30,7 +31,7 @@ fn cut(shape: ShapeSpec, at: [f64; 2]) -> CutSpec {
 }
 
 impl RigSpec {
-    /// What a scan of this rig sees unless a scene is named.
+    /// The scene of this rig's scans if none is named.
     pub fn scene(&self) -> SceneSpec {
         let u = self.scale();
         let s = |v: [f64; 3]| v.map(|x| x * u);
@@ -42,7 +43,7 @@ impl RigSpec {
             steps.push(block(s(size), s([TREAD_MM[0] * (i as f64 - 2.0), 0.0, top]), 0.8));
         }
         let mut part = block(s([36.0, 24.0, PART_MM]), [0.0; 3], 0.6);
-        // Through and through: the floor shows.
+        // The cuts go through the plate, so that the floor is visible.
         let through = 2.0 * PART_MM;
         part.cut = vec![
             cut(ShapeSpec::Block { size_mm: s([6.0, 8.0, through]) }, [-18.0 * u, 4.0 * u]),
@@ -68,12 +69,12 @@ impl RigSpec {
         }
     }
 
-    /// Shots of a scan of that scene in steps of one and a half pixel footprints.
+    /// Number of shots of a scan of that scene in steps of one and a half pixel footprints.
     pub fn shots(&self) -> usize {
         self.shots_over(32.0 * self.scale())
     }
 
-    /// The recipe (TOML) of the notched part for scans in so many shots.
+    /// The recipe (TOML) of the notched part, for scans of `shots` shots.
     pub fn recipe(&self, shots: usize) -> String {
         let u = self.scale();
         let step = (32.0 * u / (shots.max(2) - 1) as f64).max(self.footprint_mm());

@@ -1,17 +1,17 @@
 //! In: nothing. Out: how the simulated camera turns light into grey levels.
-//! Frame and unit: grey levels of the sensor's depth; each field says.
+//! Frame and unit: grey levels of the sensor's depth; stated at each field.
 
 use crate::fault::{Fault, Result};
 use rand::Rng;
 use rand_pcg::Pcg64;
 
-/// What turns light into grey levels.
+/// Conversion of light into grey levels.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sensor {
-    /// Grey depth, 8..=16.
+    /// Depth of the grey levels, bits, 8..=16.
     pub bits: u8,
-    /// Optical blur, 1 sigma, px of a picture as wide as the rig's own, 0.2..=9; scales with the width.
+    /// Optical blur, 1 sigma, px, 0.2..=9, for a picture as wide as the rig states; it scales with the width.
     pub blur_px: f64,
     /// Electrons at full scale, 500..=1e6: sets the shot noise.
     pub full_well_e: f64,
@@ -19,8 +19,8 @@ pub struct Sensor {
     pub read_noise_e: f64,
     /// Speckle contrast per pixel, 0..=0.6 (0 = none).
     pub speckle: f64,
-    /// Sigma of the blur that makes the speckle's grains, px, 0..=9; 0: each pixel's speckle is its own. A
-    /// diffraction-limited lens has 0.42 wavelengths times its f-number.
+    /// Sigma of the blur that makes the speckle's grains, px, 0..=9; 0: each pixel's speckle is independent. For a
+    /// diffraction-limited lens it is 0.42 wavelengths times the f-number.
     pub grain_px: f64,
     /// Room light that leaks into laser pictures: grey of a white surface as share of full scale, 0..=0.9.
     pub ambient_leak: f64,
@@ -50,13 +50,14 @@ impl Default for Sensor {
 }
 
 impl Sensor {
-    /// Hot pixels among this number of pixels: place and extra grey as share of full scale; the same in every picture.
+    /// Hot pixels among this number of pixels: index, and extra grey as share of full scale; the same in every
+    /// picture.
     pub fn hot_pixels(&self, pixels: usize, rng: &mut Pcg64) -> Vec<(usize, f32)> {
         let count = (self.hot_per_million * pixels as f64 / 1e6).round() as usize;
         (0..count).map(|_| (rng.random_range(0..pixels), rng.random_range(0.02f32..0.5))).collect()
     }
 
-    /// The same sensor when it is exposed `times` as long as its levels are stated for.
+    /// The same sensor with an exposure `times` as long as the one that its levels are stated for.
     #[must_use]
     pub fn exposed(self, times: f64) -> Sensor {
         Sensor {
@@ -67,7 +68,7 @@ impl Sensor {
         }
     }
 
-    /// Refuses values out of the ranges that the fields state.
+    /// Refuses values outside the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         let limits = [
             ("bits", f64::from(self.bits), 8.0, 16.0),

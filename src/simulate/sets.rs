@@ -1,5 +1,5 @@
-//! In: a set of recordings, a station, a scene. Out: what stands before the camera at each of its shots, where the
-//! robot or the axis is, and what is true of it.
+//! In: a set of recordings, a station, a scene. Out: for each shot what is before the camera, the position of robot
+//! or axis, and the true values.
 //! Frame and unit: scene, base, camera, board; mm.
 
 use super::light::InScene;
@@ -14,7 +14,7 @@ use crate::fault::Result;
 use crate::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Vec3};
 use crate::recording::{Beam, BoardSpec, Motion};
 
-/// What stands before the camera in one moment, and which pictures are taken.
+/// What is before the camera in one moment, and which pictures are taken.
 pub(super) struct Shot {
     pub scene_from_camera: Rigid<InScene, Camera>,
     /// Index into the plan's scenes.
@@ -36,33 +36,33 @@ pub(super) struct Plan {
     pub scenes: Vec<Scene>,
     pub boards: Vec<BoardSpec>,
     pub shots: Vec<Shot>,
-    /// True robot poses, one a shot; none for sets without a robot.
+    /// True robot poses, one a shot; empty for sets without a robot.
     pub poses: Vec<Rigid<Base, Flange>>,
-    /// Where an axis stood, one a shot; none where no axis moves.
+    /// Counts of the axis, one a shot; empty if no axis moves.
     pub counts: Vec<f64>,
     pub truth: TruthFile,
     pub motion: Option<Motion>,
 }
 
-/// The board that rides on an axis when no other is named: small enough to be in the picture along some way of it, or
-/// all around.
+/// The board that rides on an axis if no other is named. It is small enough to be in the picture along some of the
+/// travel, or during a whole turn.
 pub fn riding_board(rig: &RigSpec) -> BoardSpec {
     chessboard(9, 6, 6.0, 5.0, rig.board_scale())
 }
 
-/// A board of our choice, `scale` times as large, to three digits.
+/// A built-in board, scaled by `scale`, with sizes to three digits.
 fn chessboard(columns: u32, rows: u32, square_mm: f64, border_mm: f64, scale: f64) -> BoardSpec {
     let [square_mm, border_mm] = [square_mm, border_mm].map(|mm| three_digits(mm * scale));
     BoardSpec::Chessboard { inner_corners: [columns, rows], square_mm, border_mm, first_square: "black".into() }
 }
 
-/// A board's scene has its z out of the board, the board's own z goes into it.
+/// In a board's scene z points out of the board; the board's own z points into it.
 pub fn scene_from_board() -> Rigid<InScene, Board> {
     Rigid::new(Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0)), Vec3::zeros())
 }
 
 impl Plan {
-    /// `ride` moves what the sensor scans, in [`Set::Scan`] and [`Set::Axis`]; the latter needs one.
+    /// `ride` moves the scanned part in [`Set::Scan`] and [`Set::Axis`]; [`Set::Axis`] requires it.
     pub fn new(
         set: Set,
         station: &Station,
@@ -83,7 +83,7 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The scene before the robot's sensor, by the line or by the pointer.
+    /// Shows the scene to the robot's sensor, lit by the line or by the pointer.
     fn show_scene(&mut self, station: &Station, scene: &Scene, options: &SimulateOptions) {
         let base_from_scene = plan::base_from_scene(station);
         self.truth = self.truth.clone().with_scene(scene, base_from_scene);
@@ -104,7 +104,7 @@ impl Plan {
         }
     }
 
-    /// A plate that the pointer meets at equal steps of distance.
+    /// Shows a plate that the pointer meets at equal steps of distance.
     fn show_plate(&mut self, station: &Station) {
         let [near, far] = station.pointer_range;
         let half = 1.4 * far;
@@ -126,11 +126,11 @@ impl Plan {
         self.shots = self.truth.distances_mm.iter().map(shot).collect();
     }
 
-    /// The boards of a set from which camera, hand-eye, laser plane or pointer is calibrated.
+    /// Shows the boards of a set from which camera, hand-eye, laser plane or pointer is calibrated.
     fn show_boards(&mut self, station: &Station, options: &SimulateOptions) -> Result<()> {
-        // Poses of boards whose middle is so many working distances away, and how large boards are beside those that
-        // the default rig sees there: they come into the picture whole, and nobody holds one outside the working
-        // volume.
+        // `wanted` is the range of board distances in working distances. The size factor is relative to the boards
+        // that the default rig sees at that distance. Boards fit into the picture completely and stay inside the
+        // working volume.
         let (rig, z) = (&station.rig, station.working_distance);
         let views = |count, wanted: [f64; 2], tilt_deg, turn_deg| {
             let [near, far] = rig.board_distances(wanted, z);
@@ -169,7 +169,7 @@ impl Plan {
         Ok(())
     }
 
-    /// What comes past a sensor that stands still: the scene, shot by shot, or a board, stop by stop.
+    /// Shows what passes a fixed sensor: the scene, shot by shot, or a board, stop by stop.
     fn ride(&mut self, station: &Station, scene: &Scene, ride: &Ride, board: &BoardSpec) -> Result<()> {
         self.motion = Some(ride.motion());
         self.truth.axis = Some(ride.axis);
@@ -194,7 +194,7 @@ impl Plan {
         Ok(())
     }
 
-    /// Boards in free poses, one after another; with a beam each pose is seen by room light and by laser.
+    /// Shows boards in free poses, one after another; with a beam each pose is seen by room light and by laser.
     fn pose_boards(
         &mut self,
         station: &Station,
@@ -205,7 +205,8 @@ impl Plan {
     ) -> Result<()> {
         let boards = options.board.clone().map_or_else(|| ours.clone(), |b| vec![b]);
         self.scenes = boards.iter().map(|b| Scene::of_board(b, 0.85, 0.06)).collect::<Result<_>>()?;
-        // A board of another size is shown as large as ours, unless a beam has to meet it at its own distance.
+        // A board of another size is moved until it appears as large as the built-in one, unless a beam has to meet
+        // it at a fixed distance.
         let size = |b: &BoardSpec| {
             let [x0, y0, x1, y1] = b.outline();
             (x1 - x0).hypot(y1 - y0)

@@ -1,6 +1,6 @@
-//! In: convex shapes, bodies with cut-outs, rays. Out: where a ray enters a body, and how far a point
-//! is from its surface.
-//! Frame and unit: the body's own frame: origin in the middle of the top face, z up, mm.
+//! In: convex shapes, bodies with cut-outs, rays. Out: the point where a ray enters a body, and a point's distance
+//! from the body's surface.
+//! Frame and unit: body frame: origin in the middle of the top face, z up, mm.
 
 use crate::geometry::Vec3;
 
@@ -9,13 +9,13 @@ use crate::geometry::Vec3;
 pub enum Shape {
     /// |x| <= half[0], |y| <= half[1], -depth <= z <= 0; the top falls by `drop` from -x to +x.
     Block { half: [f64; 2], depth: f64, drop: f64 },
-    /// Radius `top` at z = 0, `bottom` at z = -depth.
+    /// A frustum of radius `top` at z = 0 and `bottom` at z = -depth.
     Cone { top: f64, bottom: f64, depth: f64 },
-    /// Touches z = 0 from below.
+    /// A ball that touches z = 0 from below.
     Ball { radius: f64 },
 }
 
-/// Where a ray goes through a convex shape: distances along it and outward normals.
+/// Interval of a ray inside a convex shape: distances along it and outward normals.
 #[derive(Clone, Copy, Debug)]
 pub struct Span {
     pub enter: (f64, Vec3),
@@ -39,7 +39,7 @@ fn clip(span: &mut Span, normal: Vec3, offset: f64, o: &Vec3, d: &Vec3) -> bool 
 }
 
 impl Shape {
-    /// Half extents [x, y] and depth, for bounds.
+    /// Half extents [x, y] and depth, for bounding volumes.
     pub fn bounds(&self) -> ([f64; 2], f64) {
         match *self {
             Shape::Block { half, depth, .. } => (half, depth),
@@ -101,7 +101,7 @@ impl Shape {
         self.distance_with(p, false)
     }
 
-    /// With `open`, the top face is no surface: the shape goes on upwards, as an opening does.
+    /// With `open` the top face is no surface: the shape continues upwards, as an opening does.
     fn distance_with(&self, p: &Vec3, open: bool) -> f64 {
         let ends = |depth: f64| if open { -depth - p.z } else { (p.z + depth / 2.0).abs() - depth / 2.0 };
         let combine = |q: &[f64]| {
@@ -157,7 +157,7 @@ fn narrow(s: &mut Span, a: f64, b: f64, c: f64, normal: impl Fn(f64) -> Vec3) ->
             s.leave = (t1, normal(t1));
         }
     } else if s.leave.0 <= t0 || s.enter.0 >= t1 {
-        // Wholly on one nappe.
+        // Entirely on one nappe.
     } else if s.enter.0 < t0 && s.leave.0 <= t1 {
         s.leave = (t0, normal(t0));
     } else if s.enter.0 >= t0 && s.leave.0 > t1 {
@@ -165,19 +165,19 @@ fn narrow(s: &mut Span, a: f64, b: f64, c: f64, normal: impl Fn(f64) -> Vec3) ->
     } else if s.enter.0 >= t0 {
         return false;
     } else {
-        // The end planes let one nappe through: the one that the span's ends do not see is outside.
+        // The end planes leave only one nappe; the part before t0 is taken.
         s.leave = (t0, normal(t0));
     }
     s.enter.0 < s.leave.0
 }
 
-/// A cut-out at a place of its own.
+/// A cut-out at a pose in the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cut {
     pub shape: Shape,
     /// Middle of the opening in the body's frame.
     pub at: Vec3,
-    /// Cosine and sine of the turn about z.
+    /// Cosine and sine of the rotation about z.
     pub turn: (f64, f64),
 }
 
@@ -193,7 +193,7 @@ impl Cut {
     fn span(&self, o: &Vec3, d: &Vec3) -> Option<Span> {
         self.shape.span(&self.turned(&(o - self.at), -1.0), &self.turned(d, -1.0))
     }
-    /// Signed distance; an opening in the body's top goes on upwards.
+    /// Signed distance; an opening in the body's top continues upwards.
     fn distance(&self, p: &Vec3) -> f64 {
         self.shape.distance_with(&self.turned(&(p - self.at), -1.0), self.at.z >= -SKIN)
     }
@@ -206,7 +206,7 @@ pub struct Body {
     pub cuts: Vec<Cut>,
 }
 
-/// Distances below this are the surface that the ray starts on, mm.
+/// Distances below this belong to the surface that the ray starts on, mm.
 const SKIN: f64 = 1e-6;
 
 impl Body {
@@ -217,8 +217,8 @@ impl Body {
             return None;
         }
         let mut at = outer.enter;
-        // Inside a cut-out the ray is in air: go to its end, until no cut-out holds the place.
-        // Cut-outs are few and each is left once, so this ends.
+        // Inside a cut-out the ray is in air: move to its end, until the point is in no cut-out. The loop ends
+        // because cut-outs are few and each is left once.
         for _ in 0..=self.cuts.len() {
             let mut moved = false;
             for cut in &self.cuts {
@@ -236,8 +236,8 @@ impl Body {
         (at.0 > SKIN && at.0 < outer.leave.0 - SKIN).then_some(at)
     }
 
-    /// Signed distance of a point from the body's surface, negative inside: exact on faces and inside
-    /// openings up to the nearest edge, a lower bound beside the edges of cut-outs.
+    /// Signed distance of a point from the body's surface, negative inside. It is exact on faces and inside openings
+    /// up to the nearest edge, and a lower bound beside the edges of cut-outs.
     pub fn distance(&self, p: &Vec3) -> f64 {
         let outer = self.shape.distance(p);
         self.cuts.iter().map(|c| -c.distance(p)).fold(outer, f64::max)
@@ -267,7 +267,7 @@ mod tests {
         assert_eq!(down(3.0, 1.0), Some((-2.0, 1.0)));
         assert_eq!(down(-5.5, 0.5), Some((-1.5, 1.0)));
         assert_eq!(down(10.5, 0.0), None);
-        // The corner is cut off through and through.
+        // The corner is cut off through the full depth.
         assert_eq!(down(9.6, 5.6), None);
         // Air over a hole is not on the surface.
         assert!((socket().distance(&Vec3::new(-5.0, 0.0, 0.0)) - 1.0).abs() < 1e-12);
@@ -277,7 +277,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever a ray hits lies on the surface, and the normal faces the ray.
+        /// Whatever a ray hits lies on the surface.
         #[test]
         fn hits_lie_on_the_surface(x in -12.0f64..12.0, y in -8.0f64..8.0, a in -1.0f64..1.0, b in -1.0f64..1.0) {
             let (o, d) = (Vec3::new(x - 10.0 * a, y - 10.0 * b, 10.0), Vec3::new(a, b, -1.0).normalize());

@@ -1,5 +1,5 @@
-//! In: a design and a seed. Out: one specimen of the station — camera, sensor, sheet of light, pointer,
-//! hand-eye — whose every number is known.
+//! In: a design and a seed. Out: one specimen of the station — camera, sensor, sheet of light, pointer, hand-eye —
+//! all of whose values are known.
 //! Frame and unit: camera and flange frames, mm, rad; pixels; grey levels as shares of full scale.
 
 use super::rig::RigSpec;
@@ -15,34 +15,34 @@ use std::path::Path;
 /// A sheet of light from a (virtual) point source: a Gaussian beam across the sheet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineLaser {
-    /// Where the fan starts, camera frame, mm.
+    /// Apex of the fan, camera frame, mm.
     pub source: Vec3,
-    /// Middle of the fan, in the sheet's plane, of unit length.
+    /// Middle of the fan, in the sheet's plane; unit vector.
     pub axis: Vec3,
-    /// Normal of the sheet, of unit length.
+    /// Normal of the sheet; unit vector.
     pub normal: Vec3,
-    /// Half of the fan's full opening, degrees.
+    /// Half of the fan's full opening angle, degrees.
     pub half_fan_deg: f64,
     /// 1/e² radius across the sheet at the waist, mm ...
     pub waist_radius: f64,
     /// ... which lies this far from the source, mm.
     pub waist_distance: f64,
-    /// nm.
+    /// Wavelength, nm.
     pub wavelength_nm: f64,
 }
 
 /// A round Gaussian beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pointer {
-    /// Where the beam leaves, camera frame, mm.
+    /// Point where the beam leaves, camera frame, mm.
     pub source: Vec3,
-    /// Direction of the beam, camera frame, of unit length.
+    /// Direction of the beam, camera frame; unit vector.
     pub axis: Vec3,
     /// 1/e² radius at the waist, mm.
     pub waist_radius: f64,
     /// Distance of the waist from the source, mm.
     pub waist_distance: f64,
-    /// nm.
+    /// Wavelength, nm.
     pub wavelength_nm: f64,
 }
 
@@ -68,7 +68,7 @@ impl Pointer {
     pub fn radius(&self, distance: f64) -> f64 {
         beam_radius(self.waist_radius, self.waist_distance, self.wavelength_nm, distance)
     }
-    /// The beam from its source on, mm.
+    /// The beam, starting at its source, mm.
     pub fn ray(&self) -> Ray<Camera> {
         Ray::new(self.source, self.axis).expect("of unit length")
     }
@@ -77,11 +77,11 @@ impl Pointer {
 /// One specimen of the station.
 #[derive(Clone, Debug)]
 pub struct Station {
-    /// The design that it was built after.
+    /// The design that it was built to.
     pub rig: RigSpec,
-    /// Camera and lens as they truly are.
+    /// True camera and lens.
     pub camera: Intrinsics,
-    /// What turns light into grey levels.
+    /// Conversion of light into grey levels.
     pub sensor: Sensor,
     /// The true hand-eye transform, mm.
     pub flange_from_camera: HandEye,
@@ -89,15 +89,15 @@ pub struct Station {
     pub laser: LineLaser,
     /// The pointer's beam, camera frame.
     pub pointer: Pointer,
-    /// Depths that the pointer measures between, mm.
+    /// Nearest and farthest depth that the pointer measures, mm.
     pub pointer_range: [f64; 2],
-    /// Camera depth that scans are taken at, mm.
+    /// Camera depth of scans, mm.
     pub working_distance: f64,
-    /// Of this specimen; 0 is the design itself.
+    /// Seed of this specimen; 0 is the design itself.
     pub seed: u64,
 }
 
-/// What a simulated calibration says of itself.
+/// The reason that a simulated calibration states for its quality.
 pub const TRUE_VALUES: &str = "true values of a simulated station";
 
 impl Station {
@@ -112,8 +112,8 @@ impl Station {
         Station::of(&RigSpec::paper(), seed)
     }
 
-    /// A specimen of a design as it comes from the workshop: every value off by up to a few per cent,
-    /// another specimen for every seed; 0 is the design itself.
+    /// A specimen of a design with manufacturing tolerances: every value deviates by up to a few per cent. Every
+    /// seed gives another specimen; 0 is the design itself.
     pub fn of(rig: &RigSpec, seed: u64) -> Station {
         let mut rng = Pcg64::seed_from_u64(seed ^ 0x57a7_1011);
         let mut off = |x: f64, by: f64| if seed == 0 { x } else { x + by * rng.random_range(-1.0..1.0) };
@@ -128,8 +128,8 @@ impl Station {
         Station { rig, camera, sensor, flange_from_camera, laser, pointer, pointer_range, working_distance, seed }
     }
 
-    /// The same lens on a sensor with other pixels: the width spans the same angle, rows are added or
-    /// cut off evenly above and below.
+    /// The same lens on a sensor with other pixels. The width spans the same angle; rows are added or cut off evenly
+    /// above and below.
     pub fn with_size(mut self, width: u32, height: u32) -> Station {
         let scaled_height = f64::from(self.camera.height) * f64::from(width) / f64::from(self.camera.width);
         let square = Intrinsics { height: self.camera.width, ..self.camera }.scaled_to(width, width);
@@ -142,20 +142,20 @@ impl Station {
         self.sensor.blur_px * f64::from(self.camera.width) / f64::from(self.rig.camera.width_px)
     }
 
-    /// Hot pixels of its sensor: index in rows from the top, extra grey as share of full scale.
+    /// Hot pixels of its sensor: index in row-major order from the top, extra grey as share of full scale.
     pub fn hot_pixels(&self) -> Vec<(usize, f32)> {
         let pixels = self.camera.width as usize * self.camera.height as usize;
         self.sensor.hot_pixels(pixels, &mut self.rng("hot", 0))
     }
 
-    /// Writes the true values as the calibration of a station folder; an independent random stream
-    /// for everything that is drawn later is [`Station::rng`].
+    /// Writes the true values as the calibration of a station folder. Later random draws use the independent streams
+    /// of [`Station::rng`].
     pub fn store(&self, folder: &Path) -> Result<()> {
         self.calibrations(None).store_all(folder).map(|_| ())
     }
 
-    /// The true values as a calibrated rig; with `base_from_camera` of a sensor that stands still there, in place of
-    /// the one on the flange.
+    /// The true values as a calibrated rig. With `base_from_camera` it is the rig of a fixed sensor, and this pose
+    /// replaces the hand-eye.
     pub fn calibrations(&self, base_from_camera: Option<Rigid<Base, Camera>>) -> Rig {
         let quality = Quality {
             verdict: Verdict::Good,
@@ -185,7 +185,7 @@ impl Station {
         }
     }
 
-    /// A random stream of its own for each purpose, so that adding one does not change the others.
+    /// An independent random stream for each purpose, so that adding one does not change the others.
     pub fn rng(&self, purpose: &str, index: u64) -> Pcg64 {
         let mut seed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ index.wrapping_mul(0xd1b5_4a32_d192_ed03);
         for byte in purpose.bytes() {
@@ -195,7 +195,7 @@ impl Station {
     }
 }
 
-/// The camera; `off` draws how far a value lies from the design's, here and below.
+/// The camera. `off` draws a value's deviation from the design, here and below.
 fn camera(rig: &RigSpec, off: &mut impl FnMut(f64, f64) -> f64) -> Intrinsics {
     let c = &rig.camera;
     let (width, height) = (f64::from(c.width_px), f64::from(c.height_px));
@@ -229,8 +229,8 @@ fn camera(rig: &RigSpec, off: &mut impl FnMut(f64, f64) -> f64) -> Intrinsics {
     }
 }
 
-/// The sheet of light, and the depth at which it crosses the optical axis, mm: the design's but for what `off` adds;
-/// the source lies on the laser's side.
+/// The sheet of light, and the depth at which it crosses the optical axis, mm: the design's values with deviations
+/// from `off`. The source lies on the laser's side.
 fn laser(rig: &RigSpec, off: &mut impl FnMut(f64, f64) -> f64) -> (LineLaser, f64) {
     let l = &rig.laser;
     let (baseline, angle) =
@@ -287,7 +287,7 @@ mod tests {
         for seed in 0..50 {
             let s = Station::random(seed);
             let p = Ray::new(Vec3::zeros(), Vec3::z()).unwrap().meet(&s.laser.plane()).unwrap();
-            // Roll turns the sheet about the fan's axis, which passes x = source.x, not 0.
+            // Roll turns the sheet about the fan's axis, which passes through x = source.x, not 0.
             assert!((p.z - s.working_distance).abs() < 0.5, "{} {}", p.z, s.working_distance);
             s.camera.check().unwrap();
             s.sensor.check().unwrap();

@@ -1,7 +1,7 @@
-//! In: `truth.json` of a simulated recording. Out: the exact surface and poses, and how far measured
-//! points are from them.
-//! Frame and unit: the cloud's frame (base; of a part that rides on an axis the axis frame), mm; keys named `A_T_b`
-//! map coordinates in frame b to frame A.
+//! In: `truth.json` of a simulated recording. Out: the exact surface and poses, and the distances of measured points
+//! from them.
+//! Frame and unit: the cloud's frame (base, or the axis frame for a part that rides on an axis), mm. Keys named
+//! `A_T_b` map coordinates in frame b to frame A.
 
 use super::light::InScene;
 use super::scene::{Scene, SceneSpec, part_pose};
@@ -20,7 +20,7 @@ pub struct TruthFile {
     pub set: String,
     /// Always "mm".
     pub units: String,
-    /// Of the station.
+    /// Seed of the station.
     pub seed: u64,
     /// Camera and lens.
     pub intrinsics: Intrinsics,
@@ -29,34 +29,35 @@ pub struct TruthFile {
     pub flange_from_camera: HandEye,
     /// The sheet of light, camera frame, mm.
     pub laser_plane_camera: Plane<Camera>,
-    /// Where the fan starts, camera frame, mm.
+    /// Apex of the fan, camera frame, mm.
     pub laser_source_camera_mm: Vec3,
     /// The pointer's beam, camera frame.
     pub pointer_camera: PointerTruth,
-    /// What moves the part, where no robot moves the sensor; `base` in other keys then stands for the axis frame.
+    /// The axis that moves the part, if no robot moves the sensor; `base` in other keys then stands for the axis
+    /// frame.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<Axis>,
-    /// Where the scene stood, mm; of sets that show it.
+    /// Pose of the scene, mm; for sets that show it.
     #[serde(rename = "base_T_scene", default, skip_serializing_if = "Option::is_none")]
     pub base_from_scene: Option<Rigid<Base, InScene>>,
-    /// What stood there; of sets that show it.
+    /// The scene; for sets that show it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<SceneSpec>,
-    /// The scene's parts and where they stood.
+    /// The scene's parts with their poses.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<PartTruth>,
-    /// Where the board stood, mm; of hand-eye sets.
+    /// Pose of the board, mm; for hand-eye sets.
     #[serde(rename = "base_T_board", default, skip_serializing_if = "Option::is_none")]
     pub base_from_board: Option<Rigid<Base, Board>>,
-    /// One board pose a frame, mm; of sets that show boards.
+    /// One board pose a frame, mm; for sets that show boards.
     #[serde(rename = "camera_T_board", default, skip_serializing_if = "Vec::is_empty")]
     pub camera_from_board: Vec<Rigid<Camera, Board>>,
-    /// Distances of the pointer's plate along the optical axis.
+    /// Distances of the pointer's plate along the optical axis, mm.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub distances_mm: Vec<f64>,
-    /// Errors of the reported poses, 1 sigma per axis.
+    /// Position error of the reported poses, 1 sigma per axis, mm.
     pub pose_noise_mm: f64,
-    /// Orientation, degrees.
+    /// Orientation error of the reported poses, 1 sigma per axis, degrees.
     pub pose_noise_deg: f64,
 }
 
@@ -66,23 +67,23 @@ pub struct TruthFile {
 pub struct PointerTruth {
     /// The source, camera frame, mm.
     pub origin: Vec3,
-    /// Camera frame, of unit length.
+    /// Direction of the beam, camera frame; unit vector.
     pub direction: Vec3,
 }
 
-/// A part of the scene and where it stood.
+/// A part of the scene with its pose.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PartTruth {
-    /// As the scene file calls it.
+    /// Its name in the scene file.
     pub name: String,
-    /// Origin and axes of the part, mm.
+    /// Pose of the part, mm.
     #[serde(rename = "base_T_part")]
     pub base_from_part: Rigid<Base, Part>,
 }
 
 impl TruthFile {
-    /// What is true of the station alone; the caller adds what the set shows.
+    /// The true values of the station alone; the caller adds those of the set.
     pub fn of(station: &Station, set: &str) -> TruthFile {
         TruthFile {
             set: set.into(),
@@ -123,7 +124,7 @@ impl TruthFile {
 /// The exact surface of a simulated scan.
 #[derive(Clone, Debug)]
 pub struct Truth {
-    /// What the file says.
+    /// Content of the file.
     pub file: TruthFile,
     scene: Scene,
     scene_from_base: Rigid<InScene, Base>,
@@ -132,9 +133,9 @@ pub struct Truth {
 /// How far a cloud is from the truth, mm.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct CloudErrors {
-    /// How many were compared; the other figures are 0 without any.
+    /// Number of compared points; without any the other figures are 0.
     pub points: usize,
-    /// Root mean square, median, 95th percentile and largest distance from the nearest surface.
+    /// Root mean square of the distances from the nearest surface, mm.
     pub rms_mm: f64,
     /// Median distance from the nearest surface, mm.
     pub median_mm: f64,
@@ -142,7 +143,7 @@ pub struct CloudErrors {
     pub p95_mm: f64,
     /// Largest distance, mm.
     pub largest_mm: f64,
-    /// Root mean square of the points within 1 mm, and the share beyond.
+    /// Root mean square distance of the points within 1 mm, mm.
     pub rms_without_outliers_mm: f64,
     /// Share of the points that are more than 1 mm off, 0..=1.
     pub outliers_share: f64,
@@ -164,13 +165,13 @@ impl Truth {
         Ok(Truth { scene: Scene::new(spec)?, scene_from_base: pose.inverse(), file })
     }
 
-    /// Distance of a base-frame point from the nearest surface, mm: exact on faces, a lower bound
-    /// beside the edges of cut-outs.
+    /// Distance of a base-frame point from the nearest surface, mm: exact on faces, a lower bound beside the edges
+    /// of cut-outs.
     pub fn distance(&self, in_base: &Vec3) -> f64 {
         self.scene.distance(&self.scene_from_base.point(in_base))
     }
 
-    /// Name of the part that a base-frame point is nearest to.
+    /// Name of the part that is nearest to a base-frame point; `None` if something else is nearer.
     pub fn part_near(&self, in_base: &Vec3) -> Option<&str> {
         let i = self.scene.part_near(&self.scene_from_base.point(in_base))?;
         Some(&self.scene.spec.part[i].name)
@@ -178,7 +179,7 @@ impl Truth {
 }
 
 impl CloudErrors {
-    /// Figures of distances from the surface, mm.
+    /// Figures computed from distances to the surface, mm.
     pub fn of(mut d: Vec<f64>) -> CloudErrors {
         if d.is_empty() {
             return CloudErrors::default();
@@ -220,7 +221,7 @@ mod tests {
         let path = dir.path().join("truth.json");
         std::fs::write(&path, serde_json::to_string(&file).unwrap()).unwrap();
         let truth = Truth::load(&path).unwrap();
-        // Bare board, and a tenth of a millimetre above it.
+        // The bare board, and a point a tenth of a millimetre above it.
         for (z, want) in [(0.0, 0.0), (0.1, 0.1)] {
             let p = pose.point(&Vec3::new(0.0, -30.0, z));
             assert!((truth.distance(&p) - want).abs() < 1e-9);

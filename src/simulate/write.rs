@@ -1,5 +1,5 @@
-//! In: what to simulate (sets, scene, seed, noise). Out: recording folders, each with `truth.json`, and
-//! a station folder with the true calibration.
+//! In: what to simulate (sets, scene, seed, noise). Out: recording folders, each with `truth.json`, and a station
+//! folder with the true calibration.
 //! Frame and unit: the recording format of docs/file-formats.md, mm.
 
 use super::light::{Canvas, View};
@@ -18,12 +18,12 @@ use crate::rig::{Calibration, Covariance, Kind, Quality, Rig, Verdict};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
-/// What was written.
+/// The written folders.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Simulated {
-    /// Folder of the station with its true calibration.
+    /// Folder of the station, with its true calibration.
     pub station: PathBuf,
-    /// Name of the set, its folder, its pictures.
+    /// Name, folder and number of pictures of each set.
     pub recordings: Vec<(String, PathBuf, usize)>,
 }
 
@@ -67,7 +67,7 @@ pub fn simulate(out: &Path, options: &SimulateOptions, progress: &(dyn Fn(usize,
     Ok(Simulated { station: folder, recordings })
 }
 
-/// The true axis as a calibration of the station.
+/// Writes the true axis as a calibration of the station.
 fn store_axis(ride: &Ride, station: &Path) -> Result<()> {
     let kind = match ride.axis.kind {
         AxisKind::Linear => Kind::LinearAxis,
@@ -87,7 +87,7 @@ fn store_axis(ride: &Ride, station: &Path) -> Result<()> {
 }
 
 impl Plan {
-    /// What belongs to one shot.
+    /// The entry of one shot in meta.json.
     fn frame(&self, i: usize) -> FrameRef {
         let shot = &self.shots[i];
         FrameRef {
@@ -164,7 +164,8 @@ impl Plan {
         count: &(dyn Fn() + Sync),
     ) -> Result<usize> {
         crate::files::make_folder(folder)?;
-        // A folder with a meta.json is complete: that of a former simulation goes first, the new one comes last.
+        // A folder with a meta.json counts as complete. The meta.json of an earlier simulation is therefore removed
+        // first, and the new one is written last.
         let meta = folder.join("meta.json");
         crate::files::remove(&meta).map_err(|e| Fault::write(&meta, e))?;
         let hot = station.hot_pixels();
@@ -176,7 +177,7 @@ impl Plan {
             .collect::<Result<_>>()?;
         let mut truth = self.truth.clone();
         let (mm, deg) = match self.set {
-            // The noisy poses of a hand-eye recording are those of a real arm.
+            // Unless noise is requested, the noisy poses of a hand-eye recording have the errors of a real arm.
             Set::Handeye if options.pose_noise_mm == 0.0 && options.pose_noise_deg == 0.0 => (0.05, 0.02),
             _ => (options.pose_noise_mm, options.pose_noise_deg),
         };
@@ -201,7 +202,7 @@ impl Plan {
         Ok(self.shots.iter().map(Shot::pictures).sum())
     }
 
-    /// Takes one shot's pictures; returns the stripe's points that are bright enough to be measured.
+    /// Takes one shot's pictures; returns the points on the stripe that are bright enough to be measured.
     fn take(
         &self,
         i: usize,
@@ -216,7 +217,7 @@ impl Plan {
         let sensor = &station.sensor;
         let save = |name: String, picture: Image| save_png(&picture, &folder.join(name)).map(|()| count());
         if shot.ambient {
-            // 3 x 3 rays a pixel at 640; a finer sensor's own pixels sample the edges.
+            // 3 x 3 rays a pixel at 640; the pixels of a finer sensor sample edges finely enough with one.
             let room = view.ambient(if w > 1600 { 1 } else { 3 });
             let mut rng = station.rng(self.set.name(), 2 * i as u64);
             let gain = sensor.ambient_white as f32;

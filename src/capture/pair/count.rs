@@ -1,19 +1,19 @@
-//! Pairs pictures by number: with rows of a table, with trigger pulses, or by the count that a picture brings along.
+//! Pairs pictures by number: with rows of a table, with trigger pulses, or by the count that a picture carries.
 
 use super::table::Table;
 use crate::capture::picture::{Numbering, Picture};
 use crate::recording::Stand;
 
-/// Pairs by number, and stops where an outage leaves it open what numbers mean.
+/// Pairs by number, and stops when an outage makes the meaning of the numbers uncertain.
 pub struct Counting {
     table: Table,
     seen: Option<Seen>,
-    /// Why nothing is paired any more.
+    /// The reason why nothing is paired any more.
     over: Option<&'static str>,
     said: Vec<String>,
 }
 
-/// The last picture's numbering and count, and in which direction counts went (-1, 1; 0 before they differed).
+/// The last picture's numbering and count, and the direction of the counts (-1, 1; 0 before they differed).
 struct Seen {
     numbering: Numbering,
     count: Option<i64>,
@@ -31,7 +31,7 @@ impl Counting {
         Counting { table, seen: None, over: None, said: Vec::new() }
     }
 
-    /// Where things stood at a picture; pictures are asked for in their order.
+    /// Position of what moves at a picture; must be called in the order of the pictures.
     pub fn at(&mut self, picture: &Picture, numbering: Numbering) -> Result<Stand, String> {
         self.look(picture, numbering);
         if let Some(why) = self.over {
@@ -44,7 +44,7 @@ impl Counting {
         self.table.at(number, picture.count)
     }
 
-    /// What happened since it was asked last.
+    /// Messages since the last call.
     pub fn news(&mut self) -> Vec<String> {
         std::mem::take(&mut self.said)
     }
@@ -55,14 +55,14 @@ impl Counting {
             self.seen = Some(Seen { numbering, count: picture.count, direction: 0 });
             return;
         };
-        // A picture without its count tells nothing of the counter.
+        // A picture without its count shows nothing about the counter.
         let count = picture.count.or(seen.count);
         let step = seen.count.zip(count).map_or(0, |(from, to)| to.cmp(&from) as i32);
         if numbering.outages != seen.numbering.outages && self.over.is_none() {
             self.over = match self.table {
                 Table::Rows(_) | Table::Pulses(_) => Some(TRIGGERS),
                 Table::Chunk if numbering.resets != seen.numbering.resets => Some(POWER),
-                // Some counters are set to 0 where a camera begins to send.
+                // Some counters are set to 0 when a camera starts to send.
                 Table::Chunk if step != 0 && step != seen.direction => Some(BACK),
                 Table::Chunk => None,
             };
@@ -72,7 +72,7 @@ impl Counting {
         *seen = Seen { numbering, count, direction };
     }
 
-    /// Numbers of devices begin at 0 or 1: what is above may be the first one, or the first one that came.
+    /// Devices number from 0 or 1. A larger first number may be the first picture, or the first one that arrived.
     fn begins(&mut self, numbering: Numbering) {
         let by_number = matches!(self.table, Table::Rows(_) | Table::Pulses(_));
         if by_number && numbering.first > 1 {
@@ -95,7 +95,7 @@ mod tests {
         Picture { image, id, device_ns: None, host_ns: 0, exposure_ns: None, count, stand: None }
     }
 
-    /// What pictures (number, count, outages, resets) are paired with, and how often something was said.
+    /// The counts that pictures (number, count, outages, resets) are paired with, and the number of messages.
     fn paired(table: &Table, first: u64, pictures: &[(u64, i64, u64, u64)]) -> (Vec<Option<f64>>, usize) {
         let mut counting = Counting::new(table.clone());
         let stands = pictures.iter().map(|&(id, count, outages, resets)| {
@@ -112,15 +112,15 @@ mod tests {
             let through = [(1, 0, 0, 0), (2, 0, 0, 0), (4, 0, 0, 0)];
             let right = [Some(0.0), Some(10.0), Some(30.0)];
             assert_eq!(paired(&table, 1, &through), (right.to_vec(), 0));
-            // Numbers begin anew, or seem to go on; the clock ran on, or did not; for good.
+            // Numbers restart or seem to go on; the clock ran on or did not. In all cases pairing stops for good.
             for after in [[(1, 0, 1, 1), (2, 0, 1, 1)], [(5, 0, 1, 0), (6, 0, 1, 0)], [(5, 0, 1, 1), (6, 0, 2, 1)]] {
                 let (stands, said) = paired(&table, 1, &[&through[..], &after].concat());
                 assert_eq!((stands, said), ([&right[..], &[None; 2]].concat(), 1), "{after:?}");
             }
-            // No number makes it panic, or wrap; the first of all may have any, which is said.
+            // No number causes a panic or a wrap-around. The very first number may be any, which is reported.
             let far = [(5000, 0, 0, 0), (5001, 0, 0, 0), (1, 0, 0, 0), (0, 0, 0, 0)];
             assert_eq!(paired(&table, 5000, &far), (vec![Some(0.0), Some(10.0), None, None], 1));
-            // The first came only in part.
+            // The first picture arrived only in part.
             assert_eq!(paired(&table, 1, &[(2, 0, 0, 0), (3, 0, 0, 0)]).0, [Some(10.0), Some(20.0)]);
         }
     }
@@ -135,9 +135,9 @@ mod tests {
         assert_eq!(of((1, -700, 1, 1)), None, "its clock began anew");
         assert_eq!(of((1, 0, 1, 0)), None, "the counter was set to 0");
         assert_eq!(of((1, i64::MAX, 1, 0)), None);
-        // Of one picture no direction is known.
+        // A single picture gives no direction.
         assert_eq!(paired(&Table::Chunk, 1, &[(1, 5, 0, 0), (2, 9, 1, 0)]).0, [Some(5.0), None]);
-        // Later outages are judged like the first, and what is lost stays lost.
+        // Later outages are judged like the first, and pairing that stopped stays stopped.
         let twice = [(1, 5, 0, 0), (2, 9, 0, 0), (3, 12, 1, 0), (4, 20, 2, 1), (5, 30, 2, 1)];
         assert_eq!(paired(&Table::Chunk, 1, &twice), (vec![Some(5.0), Some(9.0), Some(12.0), None, None], 1));
     }

@@ -1,4 +1,4 @@
-//! In: where poses come from. Out: a track of them that grows while a thread listens or asks.
+//! In: a source of poses. Out: a track of them that grows while a thread listens or polls.
 //! Frame and unit: base_from_flange, mm, or counts; the host's time in ns.
 
 use super::lines::{LONGEST, LineClock, Lines};
@@ -16,11 +16,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// From one question to a robot to the next: as often as most controllers answer.
+/// Interval of queries to a robot: as often as most controllers answer.
 const ASK: Duration = Duration::from_millis(8);
-/// What a pose of the sender's own time may have been held up on its shortest way, 1 sigma, ns.
+/// Uncertainty of the shortest transmission delay of a pose with the sender's time, 1 sigma, ns.
 const WAY: f64 = 2e5;
-/// From one attempt to reach a server again to the next.
+/// Interval of attempts to reach a server again.
 const RETRY: Duration = Duration::from_millis(500);
 
 #[derive(Default)]
@@ -31,7 +31,7 @@ struct State {
     came: u64,
 }
 
-/// Poses that come in.
+/// A running source of poses.
 pub struct PoseFeed {
     state: Arc<Mutex<State>>,
     stop: Arc<AtomicBool>,
@@ -44,10 +44,10 @@ fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
 }
 
 impl PoseFeed {
-    /// Starts listening or asking. `sim` is what a simulated camera moves, where one is.
+    /// Starts listening or polling. `sim` states what a simulated camera moves, if there is one.
     ///
     /// # Errors
-    /// Nobody answers; no such file.
+    /// No server or robot answers; the file does not exist.
     pub fn start(uri: &PoseUri, sim: Option<&SimSpec>) -> Result<PoseFeed> {
         let shared: Shared = Default::default();
         let theirs = (shared.0.clone(), shared.1.clone());
@@ -68,7 +68,7 @@ impl PoseFeed {
             }
             PoseUri::Lines(path) => {
                 let file = open(path)?;
-                // A named pipe is opened, and read, only when somebody writes into it.
+                // A named pipe opens, and is read, only once a program writes to it.
                 let paced = !path.is_file();
                 thread(Box::new(move |s| match file() {
                     Ok(file) => drop(listen(file, &s, paced)),
@@ -95,7 +95,7 @@ impl PoseFeed {
         Ok(PoseFeed { state: shared.0, stop: shared.1 })
     }
 
-    /// Poses that somebody else puts in, for tests and for programs of their own.
+    /// A feed of given poses, for tests and for programs that supply the poses themselves.
     pub fn of(samples: impl IntoIterator<Item = Sample>) -> PoseFeed {
         let feed = PoseFeed { state: Arc::default(), stop: Arc::default() };
         {
@@ -106,7 +106,7 @@ impl PoseFeed {
         feed
     }
 
-    /// Where it stood at a time of the host's; as [`Track::at`].
+    /// Position at a host's time; as [`Track::at`].
     pub fn at(&self, ns: u64) -> Option<std::result::Result<Between, String>> {
         lock(&self.state).track.at(ns)
     }
@@ -116,17 +116,17 @@ impl PoseFeed {
         lock(&self.state).track.newest()
     }
 
-    /// Why poses can be believed no more: the run ends with it.
+    /// The reason why poses are no longer reliable; it ends the run.
     pub fn fault(&self) -> Option<Fault> {
         lock(&self.state).fault.clone()
     }
 
-    /// What happened since it was asked last.
+    /// Messages since the last call.
     pub fn news(&self) -> Vec<String> {
         std::mem::take(&mut lock(&self.state).said)
     }
 
-    /// Poses that came.
+    /// Number of poses received.
     pub fn came(&self) -> u64 {
         lock(&self.state).came
     }
@@ -138,7 +138,8 @@ impl Drop for PoseFeed {
     }
 }
 
-/// Ends the track with the thread that fills it, however that ends: else pictures would wait for poses that never come.
+/// Ends the track when the thread that fills it ends for any reason: otherwise pictures would wait for poses that
+/// never come.
 struct Last(Shared);
 
 impl Drop for Last {
@@ -166,7 +167,7 @@ fn connect(address: &str) -> Result<TcpStream> {
     })
 }
 
-/// A file is looked at now, opened by the thread.
+/// Checks a file now; the thread opens it later.
 fn open(path: &Path) -> Result<impl FnOnce() -> Result<std::fs::File> + Send + 'static> {
     std::fs::metadata(path).map_err(|e| Fault::read(path, e))?;
     let path = path.to_owned();
@@ -187,7 +188,7 @@ fn listen_again(stream: TcpStream, address: &str, shared: &Shared) {
     }
 }
 
-/// Reads lines to the end; says how it ended.
+/// Reads lines to the end; returns how the stream ended.
 fn listen(stream: impl Read, shared: &Shared, paced: bool) -> String {
     let (mut reader, mut lines, mut clock) = (BufReader::new(stream), Lines::default(), ClockMap::default());
     let mut line = Vec::new();
@@ -199,7 +200,7 @@ fn listen(stream: impl Read, shared: &Shared, paced: bool) -> String {
         match (&mut reader).take(LONGEST as u64).read_until(b'\n', &mut line) {
             Err(e) => return e.to_string(),
             Ok(0) => return "closed".into(),
-            // Half a line is no pose: its last number may have lost digits.
+            // An incomplete line is no pose: its last number may have lost digits.
             Ok(n) if line.last() != Some(&b'\n') => {
                 let what = if n == LONGEST {
                     "a line without an end"
@@ -248,10 +249,11 @@ fn simulate(motion: &SimMotion, shared: &Shared) {
     }
 }
 
-/// Of a controller's time, ns: most count whole milliseconds.
+/// Resolution of a controller's time, ns: most count whole milliseconds.
 const RESOLUTION: u64 = 1_000_000;
 
-/// A pose with its time. A controller's own time is told by round trips, half its resolution wider at both ends.
+/// A pose with its time. A controller's own time is converted by round trips, widened by half its resolution at both
+/// ends.
 fn sample(pose: &TimedPose, clock: &mut ClockMap) -> Sample {
     let (before_ns, after_ns) = (ns_of(pose.asked), ns_of(pose.here));
     let plain = || (before_ns + (after_ns - before_ns) / 2, 0.5 * (after_ns - before_ns) as f64 / 3f64.sqrt());
@@ -266,8 +268,8 @@ fn sample(pose: &TimedPose, clock: &mut ClockMap) -> Sample {
     Sample { ns, sigma_ns, stand: Stand::Robot(pose.base_from_flange) }
 }
 
-/// Asks a robot until it is told to stop; `again` connects anew where a connection broke. A list of poses that is at
-/// its end stays so.
+/// Polls a robot until it is stopped; `again` reconnects after a broken connection. A list of poses that has ended
+/// is not started again.
 fn ask(poses: Box<dyn PoseSource>, again: impl Fn() -> Result<Box<dyn PoseSource>>, shared: &Shared) {
     let (mut clock, mut poses, mut answers) = (ClockMap::default(), Some(poses), true);
     while !shared.1.load(Ordering::Relaxed) {
@@ -320,7 +322,7 @@ mod tests {
         TimedPose { base_from_flange: Rigid::identity(), figure: None, asked, here: asked + way, device }
     }
 
-    /// Round trips far shorter than the millisecond that a controller counts in.
+    /// Round trips far shorter than the controller's resolution of a millisecond.
     #[test]
     fn a_controller_that_counts_whole_milliseconds_does_not_jump() {
         let (begun, mut clock) = (Instant::now() + Duration::from_secs(1), ClockMap::default());

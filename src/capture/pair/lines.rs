@@ -1,5 +1,5 @@
-//! In: lines of text that say where something stood: a head that names convention and clock, then a time and a pose,
-//! or a count, each. Out: what each line says; refused where units or order are not what was named.
+//! In: lines of text with positions: a head that names convention and clock, then a time and a pose or a count in
+//! each line. Out: the content of each line; refused if units or order contradict the head.
 //! Frame and unit: base_from_flange, mm, or counts; ns of the clock that the head names.
 
 use crate::fault::{Fault, Result};
@@ -7,21 +7,21 @@ use crate::geometry::CountUnit;
 use crate::recording::Stand;
 use crate::robot::Convention;
 
-/// Which clock the times are of.
+/// The clock of the times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineClock {
-    /// This machine's, since the Unix epoch.
+    /// This machine's clock, since the Unix epoch.
     Unix,
-    /// The sender's own; mapped by the earliest arrivals.
+    /// The sender's clock; converted by the earliest arrivals.
     Own,
 }
 
-/// What one line says.
+/// Content of one line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Told {
-    /// By [`Lines::clock`].
+    /// Time by [`Lines::clock`], ns.
     pub t_ns: u64,
-    /// Where it stood.
+    /// Position of what moves.
     pub stand: Stand,
 }
 
@@ -31,11 +31,12 @@ enum Kind {
     Count,
 }
 
-/// Lines from this number on are judged by their units.
+/// From this number of lines on, their units are judged.
 const JUDGED: usize = 5;
-/// A second of the sender's lasts between half and twice as long here, whatever the network does, over this time, ns.
+/// Over this time, ns, a second of the sender must last between half and twice as long here, whatever the network
+/// does.
 const LONG_ENOUGH: u64 = 200_000_000;
-/// Poses that all lie this near to the base's origin, mm, are in metres.
+/// Poses that all lie within this distance of the base's origin, mm, are in metres.
 const METRES: f64 = 8.0;
 /// Longest line, bytes.
 pub(super) const LONGEST: usize = 4096;
@@ -45,7 +46,7 @@ pub(super) const LONGEST: usize = 4096;
 pub struct Lines {
     kind: Option<Kind>,
     clock: Option<LineClock>,
-    /// The head says that odd numbers are meant.
+    /// The head states that unusual numbers are intended.
     meant: bool,
     first: Option<(u64, u64)>,
     seen: usize,
@@ -60,21 +61,21 @@ fn head() -> &'static str {
 }
 
 impl Lines {
-    /// Which clock the times are of.
+    /// The clock of the times.
     pub fn clock(&self) -> LineClock {
         self.clock.unwrap_or(LineClock::Own)
     }
 
-    /// What an axis' counts are in.
+    /// Unit of an axis' counts.
     pub fn unit(&self) -> Option<CountUnit> {
         self.unit
     }
 
-    /// Reads a line that was here at `here_ns`; `None` for the head and for empty lines. `paced`: lines come as they
-    /// are written, not out of a file.
+    /// Reads a line that arrived at `here_ns`; `None` for the head and for empty lines. `paced` means that lines
+    /// arrive as they are written, not out of a file.
     ///
     /// # Errors
-    /// Numbers before the head, another number of them, a unit that is not the one that was named.
+    /// Numbers before the head, a wrong number of values, a unit that contradicts the head.
     pub fn read(&mut self, line: &str, here_ns: u64, paced: bool) -> Result<Option<Told>> {
         let line = line.trim();
         if let Some(comment) = line.strip_prefix('#') {
@@ -143,7 +144,7 @@ impl Lines {
         Ok(())
     }
 
-    /// Units show in what they would mean.
+    /// Checks units by the plausibility of the values.
     fn judge(
         &mut self,
         kind: Kind,
@@ -158,7 +159,7 @@ impl Lines {
         self.units(kind, numbers, stand)
     }
 
-    /// Times go on as fast as time does, and by the clock that the head names.
+    /// Checks that times advance at the rate of real time, and belong to the clock that the head names.
     fn clocks(&mut self, t_ns: u64, here_ns: u64, paced: bool) -> Result<()> {
         let (t0, here0) = *self.first.get_or_insert((t_ns, here_ns));
         let (there, here) = (t_ns.saturating_sub(t0) as f64, here_ns.saturating_sub(here0));
@@ -183,7 +184,7 @@ impl Lines {
         Ok(())
     }
 
-    /// Places and angles are as large as in the convention's units.
+    /// Checks that positions and angles are plausible in the convention's units.
     fn units(&mut self, kind: Kind, numbers: &[f64], stand: &Stand) -> Result<()> {
         let (Kind::Pose(convention), Stand::Robot(pose), false) = (kind, stand, self.meant) else { return Ok(()) };
         self.reach = self.reach.max(pose.translation.norm());

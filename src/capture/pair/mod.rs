@@ -1,5 +1,5 @@
-//! In: pictures, and what tells where things stood: by stillness, by number, by time. Out: the two brought together,
-//! or the picture left out with the reason. Nothing is extrapolated.
+//! In: pictures, and positions of what moves, related by rest, by number or by time. Out: pairs of the two, or
+//! excluded pictures with the reason. Nothing is extrapolated.
 //! Frame and unit: base_from_flange, mm; counts; times in ns.
 
 mod count;

@@ -1,4 +1,5 @@
-//! In: pictures as they come, a way to pair. Out: each with where things stood, in order, or left out with the reason.
+//! In: pictures as they arrive, a way to pair. Out: each with the position of what moves, in order, or excluded with
+//! the reason.
 //! Frame and unit: base_from_flange, mm, or counts; times in ns.
 
 use super::count::Counting;
@@ -9,85 +10,85 @@ use crate::capture::picture::{Numbering, Picture};
 use crate::recording::{Pairing, Slip, Stand, Taken};
 use std::collections::VecDeque;
 
-/// How pictures and what moves are brought together.
+/// How pictures and positions are paired.
 pub enum Way {
-    /// Nothing moves, or nobody wants to know.
+    /// Nothing moves, or positions are not needed.
     Nothing,
-    /// The source says.
+    /// The source states the position.
     Given,
-    /// Everything stands still at a picture.
+    /// Everything is at rest at a picture.
     Step(PoseFeed, Still),
     /// By number.
     Count(Counting),
     /// By time. The pictures' times are late by `delay_ns`, known to `delay_sigma_ns`.
     Clock {
-        /// Where poses come from.
+        /// Source of the poses.
         poses: PoseFeed,
-        /// Of the calibration of the latency; 0 where there is none.
+        /// Calibrated latency, ns; 0 if it was not calibrated.
         delay_ns: f64,
-        /// 1 sigma.
+        /// Standard deviation of the latency, ns.
         delay_sigma_ns: f64,
     },
 }
 
-/// A picture and where things stood.
+/// A picture with the position of what moves.
 #[derive(Debug)]
 pub struct Paired {
     /// The picture.
     pub picture: Box<Picture>,
-    /// Where what moves stood; none where nothing moves.
+    /// Position of what moves; none if nothing moves.
     pub stand: Option<Stand>,
     /// Numbers, clocks, pairing, uncertainty.
     pub taken: Taken,
 }
 
-/// A picture of which nobody knows where things stood.
+/// An excluded picture, whose position is unknown.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LeftOut {
-    /// The device's number of it.
+    /// The device's number of the picture.
     pub id: u64,
-    /// When it was here, ns.
+    /// Arrival, host's time, ns.
     pub host_ns: u64,
-    /// Why.
+    /// Reason of the exclusion.
     pub why: String,
 }
 
-/// What comes of a picture.
+/// Result for a picture.
 pub type Outcome = Result<Paired, LeftOut>;
 
-/// A pose that does not come within this time, ns, does not come.
+/// A pose that does not arrive within this time, ns, is not waited for any longer.
 const PATIENCE: u64 = 1_000_000_000;
-/// Scatter of arrivals of a device without a clock of its own, 1 sigma, ns: what a system's scheduler makes of them.
+/// Scatter of arrival times of a device without a clock, caused by the system's scheduler, 1 sigma, ns.
 const ARRIVAL: f64 = 1e6;
 
-/// Holds pictures until it is known where things stood.
+/// Holds pictures until their position is known.
 pub struct Pairer {
     way: Way,
     waiting: VecDeque<(Box<Picture>, Numbering)>,
 }
 
 impl Pairer {
-    /// Pairs in one way.
+    /// Pairs in the given way.
     pub fn new(way: Way) -> Pairer {
         Pairer { way, waiting: VecDeque::new() }
     }
 
-    /// Takes in the next picture.
+    /// Adds the next picture.
     pub fn push(&mut self, picture: Box<Picture>, numbering: Numbering) {
         self.waiting.push_back((picture, numbering));
     }
 
-    /// What happened since it was asked last.
+    /// Messages since the last call.
     pub fn news(&mut self) -> Vec<String> {
         if let Way::Count(counting) = &mut self.way { counting.news() } else { Vec::new() }
     }
 
-    /// Pictures that wait for a pose.
+    /// Number of pictures that wait for a pose.
     pub fn waiting(&self) -> usize {
         self.waiting.len()
     }
 
-    /// Where poses come from while it runs.
+    /// The running source of poses, if there is one.
     pub fn poses(&self) -> Option<&PoseFeed> {
         match &self.way {
             Way::Step(poses, _) | Way::Clock { poses, .. } => Some(poses),
@@ -95,8 +96,8 @@ impl Pairer {
         }
     }
 
-    /// The next outcome, in the order of the pictures; `None` where it is too early to say. With `all` nothing is
-    /// waited for.
+    /// The next outcome, in the order of the pictures; `None` if it is too early to decide. With `all` it does not
+    /// wait.
     pub fn next(&mut self, clock: &ClockMap, all: bool) -> Option<Outcome> {
         let (picture, numbering) = self.waiting.front()?;
         let late = all || now_ns().saturating_sub(picture.host_ns) > PATIENCE;
@@ -132,7 +133,8 @@ impl Way {
             }),
             Way::Count(counting) => Some(counting.at(picture, numbering).map(|s| plain(Some(Pairing::Count), Some(s)))),
             Way::Step(poses, still) => {
-                // A picture may be long under way: where the device has a clock, its exposure was when that says.
+                // A picture may be in transit for long: if the device has a clock, it gives the time of the
+                // exposure.
                 let exposed = picture.exposure_ns.unwrap_or(0);
                 if let Some(Some(Err(why))) = picture.device_ns.map(|ns| clock.told(ns, picture.host_ns)) {
                     return Some(Err(why));
@@ -152,7 +154,7 @@ impl Way {
             Way::Clock { poses, delay_ns, delay_sigma_ns } => {
                 let middle = match picture.device_ns.map(|ns| clock.told(ns, picture.host_ns)) {
                     Some(Some(Err(why))) => return Some(Err(why)),
-                    // Its clock is read again soon.
+                    // The device's clock will be read again soon.
                     Some(None) if !late => return None,
                     _ => middle(picture, clock),
                 };
@@ -175,7 +177,8 @@ impl Way {
     }
 }
 
-/// Something that stands still stood still this long before the picture too, and after it, or until it was here; ns.
+/// What is at rest must be at rest for this time before the exposure, and for this time after it or until the
+/// picture arrived; ns.
 const AROUND: u64 = 20_000_000;
 
 struct Standing {
@@ -186,7 +189,8 @@ struct Standing {
     delay_ns: Option<f64>,
 }
 
-/// The middle of a picture's exposure by the host's clock: by the device's where it has one, else by the arrival.
+/// The middle of a picture's exposure by the host's clock: from the device's clock if it has one, else from the
+/// arrival.
 pub fn middle(picture: &Picture, clock: &ClockMap) -> Moment {
     let half = 0.5 * picture.exposure_ns.unwrap_or(0) as f64;
     match picture.device_ns.and_then(|ns| clock.host(ns)) {

@@ -1,28 +1,28 @@
-//! In: the pose before and after a picture of something that stands still. Out: whether it stood still.
+//! In: the pose before and after a picture of something at rest. Out: whether it was at rest.
 //! Frame and unit: base_from_flange, mm and degrees; counts.
 
 use crate::recording::Stand;
 
-/// How still is still.
+/// Largest motion that counts as rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Still {
-    /// mm.
+    /// Translation, mm.
     pub mm: f64,
-    /// Degrees.
+    /// Rotation, degrees.
     pub deg: f64,
-    /// Of an axis.
+    /// Motion of an axis, counts.
     pub counts: f64,
 }
 
 impl Default for Still {
-    /// An arm's encoders at rest: a hundredth of a millimetre and of a degree; a count.
+    /// Encoder noise of an arm at rest: a hundredth of a millimetre and of a degree; a count.
     fn default() -> Self {
         Still { mm: 0.01, deg: 0.01, counts: 1.0 }
     }
 }
 
 impl Still {
-    /// `Err`: by how much it moved.
+    /// `Err` states by how much it moved.
     pub fn check(&self, before: &Stand, after: &Stand) -> Result<(), String> {
         match (before, after) {
             (Stand::Robot(a), Stand::Robot(b)) => {

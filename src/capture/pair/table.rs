@@ -1,22 +1,22 @@
-//! In: where things stood, numbered; or how far an axis goes from pulse to pulse. Out: where they stood at a
-//! picture's number. Gaps stay gaps.
+//! In: numbered positions, or the travel of an axis from pulse to pulse. Out: the position at a picture's number.
+//! Gaps are not filled.
 //! Frame and unit: base_from_flange, mm, or counts.
 
 use crate::recording::Stand;
 
-/// Stands by number.
+/// Positions by number.
 #[derive(Clone, Debug)]
 pub enum Table {
-    /// The first picture's is number 0; each number has its own.
+    /// One position for each number; the first picture has number 0.
     Rows(Vec<Option<Stand>>),
     /// An axis that triggers the camera: counts from one pulse to the next.
     Pulses(f64),
-    /// The picture brings its count along (chunk data).
+    /// The picture carries its count (chunk data).
     Chunk,
 }
 
 impl Table {
-    /// `number`: the picture's id, from the first one's on; `count`: what it brought along.
+    /// `number` is the picture's id counted from the first one's; `count` is the count that the picture carries.
     pub fn at(&self, number: u64, count: Option<i64>) -> Result<Stand, String> {
         match self {
             Table::Rows(rows) => match rows.get(number as usize) {

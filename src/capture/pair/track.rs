@@ -1,40 +1,41 @@
-//! In: where something stood, sample after sample with its time. Out: where it stood at a time between two of them,
-//! how fast it moved; or why nobody knows.
+//! In: positions with their times, sample by sample. Out: position and speed at a time between two samples, or the
+//! reason why they are unknown.
 //! Frame and unit: base_from_flange in mm, or counts; the host's time in ns.
 
 use crate::geometry::{Base, Flange, Rigid, exp, log};
 use crate::recording::Stand;
 use std::collections::VecDeque;
 
-/// Where it stood at a moment.
+/// A position at a moment.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
-    /// Host's time.
+    /// Host's time, ns.
     pub ns: u64,
-    /// 1 sigma of that time, ns.
+    /// Standard deviation of that time, ns.
     pub sigma_ns: f64,
-    /// Where.
+    /// The position.
     pub stand: Stand,
 }
 
-/// Where something stood between two samples.
+/// Position and speed between two samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Between {
-    /// Where.
+    /// The position.
     pub stand: Stand,
-    /// How it moved, a second: of a flange the motion seen from the base (mm, then rad), of an axis its counts in the
-    /// first place.
+    /// Motion per second: for a flange the motion seen from the base (mm, then rad), for an axis its counts in the
+    /// first element.
     pub rate: [f64; 6],
-    /// 1 sigma of the samples' times, ns.
+    /// Standard deviation of the samples' times, ns.
     pub sigma_ns: f64,
 }
 
-/// Samples that are kept; at 1000 a second half a minute.
+/// Number of stored samples; half a minute at 1000 a second.
 const KEPT: usize = 30_000;
-/// A gap is longer than so many usual steps, and than this, ns.
+/// A gap is longer than this many usual steps, and longer than `SHORTEST_GAP`, ns.
 const GAP: f64 = 2.5;
 const SHORTEST_GAP: f64 = 20e6;
-/// A jump is so many times as long as what came before and after, and longer than this (mm, or mrad of turn; counts).
+/// A jump exceeds this many times the usual motion around it, plus the shortest jump (mm or mrad of rotation;
+/// counts).
 const JUMP: f64 = 3.0;
 const SHORTEST_JUMP: f64 = 0.3;
 const SHORTEST_COUNTS: f64 = 10.0;
@@ -42,7 +43,7 @@ const SHORTEST_COUNTS: f64 = 10.0;
 #[derive(Clone, Copy, Debug)]
 struct Kept {
     sample: Sample,
-    /// Time ran backwards, or the stream broke, before it.
+    /// Whether time ran backwards, or the stream was interrupted, before it.
     broken: bool,
 }
 
@@ -58,7 +59,8 @@ pub struct Track {
 }
 
 impl Track {
-    /// Adds a sample. One that is not after the last breaks the track: nothing is told across it.
+    /// Adds a sample. A sample that is not later than the last one breaks the track: nothing is interpolated across
+    /// the break.
     pub fn add(&mut self, sample: Sample) {
         if let Some(last) = self.samples.back() {
             if sample.ns <= last.sample.ns {
@@ -77,12 +79,12 @@ impl Track {
         }
     }
 
-    /// What comes from now on does not follow what came: the stream was cut.
+    /// Marks an interruption of the stream: later samples do not continue the earlier ones.
     pub fn cut(&mut self) {
         self.broken = true;
     }
 
-    /// No more will come.
+    /// No more samples will come.
     pub fn end(&mut self) {
         self.ended = true;
     }
@@ -92,12 +94,12 @@ impl Track {
         self.samples.back().map(|k| k.sample.ns)
     }
 
-    /// How often time ran backwards.
+    /// Number of times that time ran backwards.
     pub fn backwards(&self) -> u64 {
         self.backwards
     }
 
-    /// Where it stood at a time. `None`: it is too early to say. `Err`: why nobody will know.
+    /// Position at a time. `None`: it is too early to decide. `Err`: the reason why it stays unknown.
     pub fn at(&self, ns: u64) -> Option<Result<Between, String>> {
         let after = self.samples.partition_point(|k| k.sample.ns < ns);
         if after == self.samples.len() {
@@ -114,7 +116,7 @@ impl Track {
                 None => "no pose came".into(),
             }));
         }
-        // A jump is told by what comes after it.
+        // A jump can be recognised only with the sample after it.
         if after + 1 == self.samples.len() && !self.ended && self.samples.len() > 2 {
             return None;
         }
@@ -140,7 +142,7 @@ impl Track {
         Some(between(&from.stand, &to.stand, share, dt * 1e-9).map(|(stand, rate)| Between { stand, rate, sigma_ns }))
     }
 
-    /// Whether the step to a sample is longer than its neighbours by more than anything that moves can make it.
+    /// Whether the step to a sample exceeds its neighbours by more than any real motion can.
     fn jump(&self, to: usize) -> Option<String> {
         let way = |i: usize| -> Option<[f64; 2]> {
             let (a, b) = (self.samples.get(i.checked_sub(1)?)?, self.samples.get(i)?);
@@ -153,7 +155,7 @@ impl Track {
         let speed = |i: Option<usize>| i.and_then(way).map(|[d, dt]| d / dt);
         let around = [speed(to.checked_sub(1)), speed(Some(to + 1))];
         let fastest = around.iter().flatten().fold(0.0, |m: f64, v| m.max(*v));
-        // With no neighbour nothing can be compared.
+        // Without a neighbour there is nothing to compare with.
         around.iter().any(Option::is_some).then_some(())?;
         let shortest =
             if matches!(self.samples[to].sample.stand, Stand::Robot(_)) { SHORTEST_JUMP } else { SHORTEST_COUNTS };
@@ -167,7 +169,7 @@ fn ms(a: u64, b: u64) -> f64 {
     (a as f64 - b as f64) * 1e-6
 }
 
-/// mm and mrad of turn, or counts.
+/// Distance in mm, mrad of rotation, or counts.
 fn distance(a: &Stand, b: &Stand) -> f64 {
     match (a, b) {
         (Stand::Robot(a), Stand::Robot(b)) => {
@@ -179,7 +181,8 @@ fn distance(a: &Stand, b: &Stand) -> f64 {
     }
 }
 
-/// On SE(3): the origin goes straight, the flange turns evenly about one axis, as an arm's straight motion does.
+/// Interpolates on SE(3): the origin moves straight, the flange rotates evenly about one axis, as in an arm's
+/// straight motion.
 fn between(a: &Stand, b: &Stand, share: f64, seconds: f64) -> Result<(Stand, [f64; 6]), String> {
     match (a, b) {
         (Stand::Robot(a), Stand::Robot(b)) => {
@@ -208,7 +211,7 @@ mod tests {
         Stand::Robot(Rigid::from_vectors(&Vec3::new(0.0, 0.0, 0.01 * x), Vec3::new(400.0 + x, 0.0, 300.0)))
     }
 
-    /// 8 ms apart, 20 mm/s; each sample may be changed or left out.
+    /// Samples 8 ms apart at 20 mm/s; each may be changed or excluded.
     fn track(change: impl Fn(u64, &mut Sample) -> bool) -> Track {
         let mut track = Track::default();
         for k in 0..100u64 {
@@ -232,7 +235,7 @@ mod tests {
         let told = whole.at(1_000_000_000 + 404_000_000).unwrap().unwrap();
         let (Stand::Robot(is), Stand::Robot(want)) = (told.stand, pose(0.16 * 50.5)) else { panic!() };
         assert!(is.difference(&want).1 < 1e-9 && is.difference(&want).0 < 1e-9);
-        // The flange itself goes 20 mm/s along x, whatever turns.
+        // The flange itself moves at 20 mm/s along x, whatever rotates.
         let v = Vec3::new(told.rate[0], told.rate[1], told.rate[2]);
         let w = Vec3::new(told.rate[3], told.rate[4], told.rate[5]);
         assert!((v + w.cross(&is.translation) - Vec3::new(20.0, 0.0, 0.0)).norm() < 1e-6);

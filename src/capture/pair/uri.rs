@@ -1,23 +1,23 @@
-//! In: the word that names where poses or counts come from. Out: what it means.
+//! In: a word that names a source of poses or counts. Out: its meaning.
 //! Frame and unit: none.
 
 use std::path::PathBuf;
 
-/// Where poses come from while pictures are taken.
+/// Source of poses while pictures are taken.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PoseUri {
-    /// `tcp://HOST:PORT`: lines from a server there.
+    /// `tcp://HOST:PORT`: lines from a server at that address.
     Tcp(String),
     /// `lines:PATH`: lines from a pipe or a file.
     Lines(PathBuf),
-    /// `sim:SEED?...`: the simulated station of the same words.
+    /// `sim:SEED?...`: the simulated station with these options.
     Sim(String),
-    /// Any other `scheme:...`: a robot on a wire.
+    /// Any other `scheme:...`: a robot on a network.
     Robot(String),
 }
 
 impl std::fmt::Display for PoseUri {
-    /// Whom it names, without what is asked of it.
+    /// The named source without its options.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let place = |s: &str| s.split('?').next().unwrap_or_default().to_owned();
         match self {

@@ -1,5 +1,5 @@
-//! In: shots as a recorder has written them. Out: the same in order for who works on them meanwhile: the next few
-//! from memory, what has to wait longer from the recorder's disk.
+//! In: shots that a recorder has written. Out: the same shots in order, for a reader that works on them meanwhile.
+//! The next few come from memory, later ones from the recorder's disk.
 //! Frame and unit: as [`crate::recording`].
 
 use crate::raster::Image;
@@ -8,35 +8,35 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// A shot that has been recorded, and waits in memory.
+/// A recorded shot that waits in memory.
 pub struct Recorded {
     /// Name of its picture in the recording.
     pub name: String,
-    /// Place in it, from 0.
+    /// Index in the recording, from 0.
     pub index: usize,
     /// The picture.
     pub image: Image,
-    /// Where what moves stood.
+    /// Position of what moves.
     pub stand: Option<Stand>,
     /// How far that may be off.
     pub slip: Option<Slip>,
-    /// When its last byte was here, ns of the host's clock.
+    /// Arrival of the last byte, ns of the host's clock.
     pub here_ns: u64,
 }
 
-/// Where a shot is that is asked for.
+/// State of a requested shot.
 pub enum Waits {
-    /// Here.
+    /// In memory.
     InMemory(Box<Recorded>),
-    /// In the recording: it waited too long.
+    /// In the recording: memory was full when it was recorded.
     OnDisk,
     /// Not recorded yet.
     Nowhere,
-    /// It never will be: the recording has ended.
+    /// It never will be recorded: the recording has ended.
     Never,
 }
 
-/// Shots that wait in memory; all others do on the disk, where they take none.
+/// Number of shots that wait in memory; all others wait on disk and use no memory.
 const HANDED: usize = 16;
 
 #[derive(Default)]
@@ -46,15 +46,15 @@ struct State {
     ended: bool,
 }
 
-/// Shots that were recorded and not yet worked on.
+/// Shots that were recorded and not yet processed.
 #[derive(Clone, Default)]
 pub struct Backlog(Arc<(Mutex<State>, Condvar)>);
 
-/// The recorder's end of it: when it is dropped the recording has ended.
+/// The recorder's end of the backlog; dropping it means that the recording has ended.
 pub struct Handing(Backlog);
 
 impl Backlog {
-    /// A recorder's end and its reader's.
+    /// The recorder's end and the reader's end.
     pub fn new() -> (Handing, Backlog) {
         let backlog = Backlog::default();
         (Handing(backlog.clone()), backlog)
@@ -64,7 +64,7 @@ impl Backlog {
         self.0.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Where shot `index` is, waited for at most this long. Asked for in order.
+    /// State of shot `index`, waiting for at most `within`. Indices must ascend.
     pub fn shot(&self, index: usize, within: Duration) -> Waits {
         let state = self.lock();
         let early = |s: &mut State| s.recorded <= index && !s.ended;
@@ -83,7 +83,7 @@ impl Backlog {
 }
 
 impl Handing {
-    /// A shot was recorded, and can be read by others.
+    /// Reports a shot that was recorded and that others can read.
     pub fn hand(&self, shot: Recorded) {
         let mut state = self.0.lock();
         state.recorded = shot.index + 1;
@@ -125,7 +125,7 @@ mod tests {
             Waits::Never => 3000,
         };
         assert_eq!((0..14).map(place).collect::<Vec<_>>(), (0..14).collect::<Vec<_>>());
-        // There is room again; what came while there was none lies before it on the disk.
+        // There is room again. The shots recorded while memory was full precede it on disk.
         handing.hand(shot(20));
         let want = [14, 15, 1016, 1017, 1018, 1019, 20, 2000];
         assert_eq!((14..22).map(place).collect::<Vec<_>>(), want);

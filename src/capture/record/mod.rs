@@ -1,4 +1,4 @@
-//! In: shots of a running camera. Out: a recording that can be opened at any moment, and the room that is left for it.
+//! In: shots of a running camera. Out: a recording that can be opened at any moment, and warnings about disk space.
 //! Frame and unit: docs/file-formats.md.
 
 mod backlog;

@@ -1,6 +1,7 @@
-//! In: pictures in order, what is known of each. Out: a recording folder: meta.json at once, then each picture before
-//! its line of frames.jsonl, so that whatever stops the program leaves a recording of all that was written.
-//! Frame and unit: docs/file-formats.md; raw frames as `RawFormat` has them.
+//! In: pictures in order, with their data. Out: a recording folder. meta.json is written at once, then each picture
+//! before its line in frames.jsonl, so that a program stopped at any moment leaves a valid recording of all written
+//! pictures.
+//! Frame and unit: docs/file-formats.md; raw frames in the layout of `RawFormat`.
 
 use super::super::format::{Format, raw_bytes};
 use super::super::pair::LeftOut;
@@ -12,11 +13,11 @@ use crate::recording::{Beam, BoardSpec, FrameRef, ImageSpec, Meta, Motion, Sourc
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// What pictures are stored as.
+/// Storage format of pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
 #[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = no_store)]
 pub enum Store {
-    /// PNG, and raw frames where PNG is too slow.
+    /// PNG, or raw frames when PNG is too slow.
     #[default]
     Auto,
     /// PNG.
@@ -29,7 +30,7 @@ fn no_store(word: &str) -> String {
     crate::fault::unknown::<Store>("way to store", word)
 }
 
-/// What pictures show.
+/// Content of the pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
 #[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = shows_nothing)]
 pub enum Shows {
@@ -46,38 +47,38 @@ fn shows_nothing(word: &str) -> String {
     crate::fault::unknown::<Shows>("thing to show", word)
 }
 
-/// How is recorded.
+/// Options of a recorder.
 #[derive(Clone, Debug, Default)]
 pub struct RecorderOptions {
-    /// Name for what is recorded.
+    /// Name of what is recorded.
     pub set: String,
-    /// What moves; none where nothing does.
+    /// What moves; none if nothing moves.
     pub motion: Option<Motion>,
-    /// What pictures show.
+    /// Content of the pictures.
     pub shows: Shows,
-    /// What they are stored as.
+    /// Storage format of the pictures.
     pub store: Store,
-    /// Which devices are recorded; none: it is nobody's business.
+    /// The recorded devices; none: not stated.
     pub sources: Option<Sources>,
-    /// The board that pictures show, where they show one.
+    /// The board that the pictures show, if any.
     pub board: Option<BoardSpec>,
-    /// How pictures are read from the sensor, where that is known.
+    /// How pictures are read from the sensor, if known.
     pub readout: Option<Readout>,
 }
 
-/// From one wait for the disk to the next: what a power cut may cost.
+/// Interval of syncs to the disk: the most that a power cut may cost.
 const SYNC: Duration = Duration::from_secs(1);
-/// Pictures wait: from so many on PNG is too slow.
+/// Number of waiting pictures from which PNG counts as too slow.
 const HURRY: usize = 4;
 const FRAMES: &str = "frames.jsonl";
 const RAW: &str = "pictures.raw";
 
-/// Where a picture went.
+/// Where a picture was stored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kept {
     /// Name in the recording.
     pub name: String,
-    /// Place in it, from 0.
+    /// Index in the recording, from 0.
     pub index: usize,
 }
 
@@ -96,7 +97,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Makes the folder and its meta.json.
+    /// Creates the folder and its meta.json.
     ///
     /// # Errors
     /// A folder that holds a recording, that another recorder writes into, or that cannot be written.
@@ -129,10 +130,11 @@ impl Recorder {
         })
     }
 
-    /// Adds a picture; `waiting` says how many wait behind it. When this returns, other programs can read it.
+    /// Adds a picture; `waiting` is the number of pictures that wait behind it. When this returns, other programs
+    /// can read it.
     ///
     /// # Errors
-    /// The disk does not take it: it is no part of the recording, which is whole without it.
+    /// The picture cannot be written: it is not part of the recording, which stays valid.
     pub fn add(&mut self, image: &Image, stand: Option<&Stand>, taken: Taken, waiting: usize) -> Result<Kept> {
         let raw = match self.options.store {
             Store::Raw => true,
@@ -183,12 +185,12 @@ impl Recorder {
         self.frames.sync()
     }
 
-    /// Pictures so far.
+    /// Number of pictures so far.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Bytes so far.
+    /// Number of bytes so far.
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
@@ -198,20 +200,20 @@ impl Recorder {
         self.format
     }
 
-    /// Where it writes.
+    /// The folder of the recording.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// What its meta.json says.
+    /// Content of its meta.json.
     pub fn meta(&self) -> Meta {
         meta(self.format, &self.options)
     }
 
-    /// Waits until all of it is on the disk, and lists what was left out.
+    /// Syncs everything to the disk, and writes the list of excluded pictures.
     ///
     /// # Errors
-    /// The disk does not take it; what was there before stays.
+    /// The disk cannot be written; what was stored before stays.
     pub fn finish(mut self, left_out: &[LeftOut]) -> Result<usize> {
         self.sync()?;
         if !left_out.is_empty() {

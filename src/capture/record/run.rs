@@ -1,4 +1,4 @@
-//! In: a stream, a recorder. Out: a recording, written by a thread of its own while others read what is there; its
+//! In: a stream, a recorder. Out: a recording, written by a separate thread while others read what is stored; its
 //! account.
 //! Frame and unit: docs/file-formats.md.
 
@@ -12,7 +12,7 @@ use super::space::Space;
 use crate::fault::{Fault, Result};
 use std::time::Duration;
 
-/// What a recording came to.
+/// Result of a recording.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Recording {
     /// Shots recorded.
@@ -27,12 +27,12 @@ pub struct Recording {
 
 const GLANCE: Duration = Duration::from_millis(200);
 
-/// Records until the stream ends. `say` is told what a person should hear, and the account now and then. With `on`
-/// each shot is handed on.
+/// Records until the stream ends. `say` receives messages for the user, and the account at intervals. With `on`,
+/// each shot is also handed to the backlog.
 ///
 /// # Errors
-/// The disk is full: what was recorded stays, and the pictures from then on are dropped. What ended the stream, where
-/// nobody wished it.
+/// The disk is full: what was recorded stays, and later pictures are dropped. The fault that ended the stream,
+/// unless the end was requested.
 pub fn record(
     stream: &mut Stream,
     mut recorder: Recorder,

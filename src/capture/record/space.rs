@@ -1,33 +1,33 @@
-//! In: a folder, how fast it fills. Out: how long the disk lasts.
+//! In: a folder and the rate at which it fills. Out: how long the disk space will last.
 //! Frame and unit: bytes, seconds.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// From one look at the disk to the next.
+/// Interval of checks of the disk.
 const LOOK: Duration = Duration::from_secs(5);
-/// Said from this on, s: time enough to make room.
+/// Remaining time, s, from which a warning is given: enough to make room.
 const SOON: f64 = 600.0;
 
-/// Watches the room on a disk.
+/// Watches the free space of a disk.
 pub struct Space {
     free: Option<u64>,
     looked: Instant,
-    /// Bytes written then, to tell how fast it goes.
+    /// Bytes written at the last check, for computing the rate.
     then: u64,
     rate: f64,
     said: f64,
 }
 
 impl Space {
-    /// Looks at the disk that a folder is on.
+    /// Checks the disk that a folder is on.
     pub fn of(folder: &Path) -> Space {
         Space { free: free(folder), looked: Instant::now(), then: 0, rate: 0.0, said: f64::INFINITY }
     }
 
-    /// What a person should hear before the disk is full: once, and again when half of the time is over. `bytes`:
-    /// written so far.
+    /// A warning before the disk is full: once, and again when half of the remaining time has passed. `bytes` is the
+    /// number written so far.
     pub fn warn(&mut self, folder: &Path, bytes: u64) -> Option<String> {
         let since = self.looked.elapsed();
         if since < LOOK {
@@ -50,7 +50,7 @@ impl Space {
     }
 }
 
-/// Free bytes as POSIX `df` tells them; none where there is no such program.
+/// Free bytes as POSIX `df` reports them; none if there is no such program.
 fn free(folder: &Path) -> Option<u64> {
     let mut df = Command::new("df");
     let output = df.args(["-Pk"]).arg(folder).stderr(Stdio::null()).stdin(Stdio::null()).output().ok()?;

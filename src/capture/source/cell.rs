@@ -1,4 +1,4 @@
-//! The camera of a simulated cell as a source of pictures, over the wire of [`crate::capture::wire`].
+//! The camera of a simulated cell as a source of pictures, with the protocol of [`crate::capture::wire`].
 
 use crate::camera::Readout;
 use crate::capture::clock::{RoundTrip, now_ns};
@@ -13,38 +13,38 @@ use std::net::{TcpStream, ToSocketAddrs};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
-/// How long is waited for a connection and for an answer.
+/// Time to wait for a connection and for an answer.
 const PATIENCE: Duration = Duration::from_secs(3);
 const GLANCE: Duration = Duration::from_millis(2);
-/// Pictures read ahead; more wait in the cell, which counts what it has to leave out.
+/// Number of pictures read ahead; more wait in the cell, which counts those that it has to drop.
 const AHEAD: usize = 2;
 
-/// A cell's camera at the other end of a TCP connection.
+/// A cell's camera at the far end of a TCP connection.
 pub struct CellCamera {
     address: String,
     rate_hz: f64,
     link: Link,
     format: Format,
     sent: u64,
-    /// Pictures that came before an answer that was waited for.
+    /// Pictures that arrived before an awaited answer.
     pending: VecDeque<(Box<Sent>, u64)>,
 }
 
-/// One connection: a thread reads, pictures and answers come through channels.
+/// One connection: a thread reads; pictures and answers come through channels.
 struct Link {
     stream: TcpStream,
     pictures: Receiver<(Box<Sent>, u64)>,
     answers: Receiver<String>,
-    /// Why the reading ended.
+    /// The reason why the reading ended.
     end: Receiver<Fault>,
 }
 
 impl CellCamera {
-    /// Connects to `HOST:PORT` and asks for `rate_hz` pictures a second; 0: as the cell likes, negative: only those
-    /// that are asked for one by one ([`CellCamera::snap`]).
+    /// Connects to `HOST:PORT` and requests `rate_hz` pictures a second; 0: the cell chooses, negative: only
+    /// pictures requested one by one ([`CellCamera::snap`]).
     ///
     /// # Errors
-    /// Nobody answers, or something else than a cell.
+    /// Nothing answers, or something other than a cell.
     pub fn open(address: &str, rate_hz: f64) -> Result<CellCamera> {
         let mut camera = CellCamera {
             address: address.into(),
@@ -73,7 +73,7 @@ impl CellCamera {
         Ok(())
     }
 
-    /// Asks for one picture, taken now; it comes as the others do.
+    /// Requests one picture, taken now; it is delivered like the others.
     ///
     /// # Errors
     /// The cell does not answer, or refuses.
@@ -81,7 +81,7 @@ impl CellCamera {
         self.ask("snap").map(|_| ())
     }
 
-    /// Sends a line, waits for its answer and gives what follows `ok`.
+    /// Sends a line, waits for its answer and returns what follows `ok`.
     fn ask(&mut self, line: &str) -> Result<String> {
         let lost = |what: String| {
             Fault::input(format!("{}: {what}", self.address))
@@ -92,7 +92,7 @@ impl CellCamera {
         sent.map_err(|e| lost(format!("cannot be written to: {e}")))?;
         let until = Instant::now() + PATIENCE;
         let answer = loop {
-            // An answer comes behind the pictures that were sent before it.
+            // An answer comes after the pictures that were sent before it.
             self.pending.extend(self.link.pictures.try_iter());
             match self.link.answers.recv_timeout(GLANCE) {
                 Ok(answer) => break answer,
@@ -122,7 +122,7 @@ impl Link {
         let _ = stream.set_nodelay(true);
         let mut reader = stream.try_clone().map_err(nobody)?;
         let (to_pictures, pictures) = sync_channel(AHEAD);
-        // One is asked for at a time.
+        // Only one question is open at a time.
         let (to_answers, answers) = sync_channel(1);
         let (to_end, end) = sync_channel(1);
         let read = move || {

@@ -1,4 +1,4 @@
-//! Runs ffmpeg as a camera: it opens what it is told in its own words, and gives grey frames with the levels as sent.
+//! Runs ffmpeg as a camera. It opens what its own arguments name, and delivers grey frames with the levels as sent.
 
 use super::pipe::Pipe;
 use crate::capture::format::{Format, RawFormat};
@@ -9,27 +9,27 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-/// ffmpeg, running, and its frames.
+/// A running ffmpeg process and its frames.
 pub struct Ffmpeg {
     arguments: Vec<String>,
     bits: u8,
     child: Child,
     pipe: Pipe,
-    /// Its last words.
+    /// Lines of its error output; the last ones are kept.
     said: Receiver<String>,
     last: Vec<String>,
     live: bool,
 }
 
-/// Words of its command line by which a device or a network is meant, which does not wait.
+/// Words in its command line that mean a device or a network, which does not wait for a reader.
 const LIVE: [&str; 9] = ["v4l2", "dshow", "avfoundation", "rtsp:", "rtp:", "udp:", "srt:", "tcp:", "-re"];
 
 impl Ffmpeg {
-    /// Starts ffmpeg with `arguments` before the output that we ask for, `bits` deep. What it opens is asked for its
-    /// size first.
+    /// Starts ffmpeg with `arguments`, followed by those for raw grey output of depth `bits`. A first run determines
+    /// the size of the pictures.
     ///
     /// # Errors
-    /// ffmpeg is missing, or cannot open it.
+    /// ffmpeg is missing, or cannot open the source.
     pub fn open(arguments: &[String], bits: u8) -> Result<Ffmpeg> {
         let format = size(arguments, bits)?;
         let (child, pipe, said) = start(arguments, format)?;
@@ -66,7 +66,7 @@ fn layout(bits: u8) -> &'static str {
     }
 }
 
-/// One frame as PGM tells the size.
+/// Determines the size from one frame in PGM format.
 fn size(arguments: &[String], bits: u8) -> Result<Format> {
     let one = ["-map", "0:v:0", "-frames:v", "1", "-f", "image2pipe", "-c:v", "pgm", "-pix_fmt", "gray", "-"];
     let output = command(arguments).args(one).output().map_err(missing)?;
@@ -82,11 +82,11 @@ fn size(arguments: &[String], bits: u8) -> Result<Format> {
         .next(format!("try it alone: ffmpeg {} -f null -", arguments.join(" "))))
 }
 
-/// Leaves levels as the camera sends them: without it ffmpeg takes luma without a tag for 16 to 235 and stretches that
-/// to 0 to 255. It comes behind the filters that a person asks for.
+/// Keeps levels as the camera sends them. Without it ffmpeg takes untagged luma for 16 to 235 and stretches it to 0
+/// to 255. It is applied after the user's filters.
 const AS_SENT: &str = "scale=in_range=full:out_range=full";
 
-/// The arguments with that filter, behind those of the last `-vf`, which is the one that ffmpeg takes.
+/// The arguments with that filter appended to the last `-vf`, which is the one that ffmpeg uses.
 fn as_sent(arguments: &[String]) -> Vec<String> {
     let mut all = arguments.to_vec();
     let filters = |a: &String| ["-vf", "-filter:v", "-filter:v:0"].contains(&a.as_str());
@@ -129,7 +129,7 @@ impl PictureSource for Ffmpeg {
         if !matches!(event, Event::Ended | Event::Lost(_)) {
             return event;
         }
-        // The pipe is closed: it ended, or ends now.
+        // The pipe is closed: ffmpeg has ended or is ending.
         let status = self.child.wait();
         let words = self.words();
         match status {

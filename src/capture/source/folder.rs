@@ -1,6 +1,6 @@
-//! In: a folder that another program fills with pictures. Out: each picture once it is complete: its size has settled
-//! and it decodes.
-//! Frame and unit: the host's time at which it was seen complete, ns.
+//! In: a folder that another program fills with pictures. Out: each picture once it is complete, that is, its size
+//! has settled and it decodes.
+//! Frame and unit: the host's time at which the picture was seen complete, ns.
 
 use crate::capture::clock::now_ns;
 use crate::capture::format::Format;
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-/// A picture whose size did not change for this long is complete, or spoilt.
+/// A picture whose size did not change for this time is complete, or spoilt.
 const SETTLED: Duration = Duration::from_millis(60);
 /// A picture that does not decode is given up after this time.
 const SPOILT: Duration = Duration::from_secs(2);
@@ -26,22 +26,22 @@ pub struct FolderCamera {
     format: Format,
     _watcher: notify::RecommendedWatcher,
     changes: Receiver<notify::Result<notify::Event>>,
-    /// Names that were there before, or were given.
+    /// Files that were there before, or that were already delivered.
     done: BTreeSet<PathBuf>,
-    /// Size when looked at last, when it changed last, when it was first seen.
+    /// Size at the last check, time of its last change, time when the file was first seen.
     growing: BTreeMap<PathBuf, (u64, Instant, Instant)>,
     next: u64,
     looked: Instant,
-    /// The first picture, which told the format.
+    /// The first picture, which determined the format.
     first: Option<Box<Picture>>,
 }
 
 impl FolderCamera {
-    /// Waits up to `patience` for the first new picture, which tells the format. `bits` is the sensor's depth of
-    /// 16-bit files.
+    /// Waits up to `patience` for the first new picture, which determines the format. `bits` is the sensor's depth
+    /// for 16-bit files.
     ///
     /// # Errors
-    /// No folder, no picture within the time, one that is no grey level picture of that depth.
+    /// A missing folder, no picture within the time, or one that is no grey picture of that depth.
     pub fn open(folder: &Path, bits: u8, patience: Duration) -> Result<FolderCamera> {
         let (send, changes) = channel();
         let cannot = |e: &dyn std::fmt::Display| {
@@ -92,7 +92,7 @@ impl FolderCamera {
             if left.is_zero() {
                 return Event::Quiet;
             }
-            // A change wakes; so does the time in which a size settles.
+            // Wakes up at a change of the folder, and after the time in which a size settles.
             let _ = self.changes.recv_timeout(left.min(SETTLED / 2));
             while self.changes.try_recv().is_ok() {}
         }
@@ -111,7 +111,7 @@ impl FolderCamera {
         if seen.0 != size {
             (seen.0, seen.1) = (size, now);
         }
-        // In order of the names: one that is being written holds back those after it.
+        // Pictures are delivered in the order of their names: one that is still being written holds back later ones.
         if seen.1.elapsed() < SETTLED {
             return None;
         }
@@ -146,7 +146,7 @@ impl FolderCamera {
     }
 }
 
-/// The pictures of a folder, in the order people count in; names that begin with a dot are being written.
+/// The pictures of a folder in natural order; files whose names begin with a dot are still being written.
 fn pictures(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Fault::read(folder, e))?;
     let kind = |p: &Path| p.extension().is_some_and(|e| KINDS.contains(&&*e.to_string_lossy().to_lowercase()));

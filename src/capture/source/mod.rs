@@ -1,5 +1,5 @@
-//! In: where pictures come from. Out: one [`PictureSource`](super::PictureSource) for each kind of place.
-//! Frame and unit: as [`super::Picture`] has them.
+//! In: the name of a source of pictures. Out: a [`PictureSource`](super::PictureSource) for each kind of source.
+//! Frame and unit: as in [`super::Picture`].
 
 pub mod cell;
 pub mod ffmpeg;

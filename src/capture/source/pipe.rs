@@ -10,7 +10,7 @@ use std::io::Read;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
 
-/// Frames read ahead; a sender that is faster waits at its own end of the pipe.
+/// Number of frames read ahead; a faster sender waits at its end of the pipe.
 const AHEAD: usize = 2;
 
 /// A reader of raw frames as a source.
@@ -23,7 +23,7 @@ pub struct Pipe {
 }
 
 impl Pipe {
-    /// Reads on a thread of its own, which ends with the reader.
+    /// Reads on a separate thread, which ends with the reader.
     ///
     /// # Errors
     /// No thread can be started.

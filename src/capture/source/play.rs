@@ -1,6 +1,6 @@
-//! In: a recording, a rate. Out: its laser pictures as a camera sends them, each with where things stood; a camera
-//! whose buffer is full loses pictures, this one too.
-//! Frame and unit: the recording's; the device's clock counts ns from its start.
+//! In: a recording, a rate. Out: its laser pictures as a camera would send them, each with the position of what
+//! moves. Like a camera with a full buffer, it loses pictures.
+//! Frame and unit: those of the recording; the device's clock counts ns from its start.
 
 use crate::camera::Readout;
 use crate::capture::clock::{RoundTrip, now_ns};
@@ -12,18 +12,18 @@ use crate::recording::{Recording, Stand};
 use std::path::Path;
 use std::time::Duration;
 
-/// Pictures are kept decoded up to so many bytes in all; larger recordings are decoded as they are asked for.
+/// Decoded pictures are kept up to this many bytes in total; larger recordings are decoded on request.
 const KEPT: usize = 512 << 20;
-/// Pictures that wait in the camera where nobody asks.
+/// Number of pictures that wait in the simulated camera's buffer.
 const BUFFER: u64 = 16;
 
-/// A recording that is played.
+/// A recording that is played back.
 pub struct Player {
     recording: Recording,
     format: Format,
     names: Vec<(String, Option<Stand>)>,
     kept: Vec<Option<Image>>,
-    /// ns between two; 0: as fast as they are asked for.
+    /// Time between two pictures, ns; 0: as fast as they are requested.
     period: u64,
     start: u64,
     loops: u64,
@@ -32,7 +32,7 @@ pub struct Player {
 }
 
 impl Player {
-    /// Plays `loops` times; `rate_hz` 0 as fast as pictures are asked for.
+    /// Plays `loops` times; with `rate_hz` 0 as fast as pictures are requested.
     ///
     /// # Errors
     /// No recording, or one without laser pictures.
@@ -59,7 +59,7 @@ impl Player {
     }
 }
 
-/// Where things stood, as far as the recording says.
+/// Positions of what moves, as far as the recording states them.
 fn stands(recording: &Recording) -> Vec<Option<Stand>> {
     let frames = &recording.meta.frames;
     if recording.meta.motion().axis().is_some() {

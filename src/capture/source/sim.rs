@@ -1,5 +1,5 @@
-//! In: a simulated station by its seed, what moves how fast. Out: the picture of where things stand right now,
-//! rendered; where they stood at any time, for the pairing by clock.
+//! In: a simulated station's seed, its motion and speed. Out: the rendered picture of the present moment; the
+//! position at any time, for the pairing by clock.
 //! Frame and unit: base_from_flange, mm, or counts; the device's clock is the host's plus the stated delay, ns.
 
 use crate::camera::Readout;
@@ -19,28 +19,29 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What is simulated.
+/// Settings of a simulated camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimSpec {
-    /// Which specimen; `sheetlight simulate --seed` makes the same.
+    /// Specimen; `sheetlight simulate --seed` makes the same one.
     pub seed: u64,
     /// Pictures a second.
     pub rate_hz: f64,
-    /// Of what moves, mm/s; degrees/s of a turntable.
+    /// Speed of the motion, mm/s; degrees/s for a turntable.
     pub speed: f64,
-    /// Nothing moves: it stands at this share of its way; a way that is gone stands elsewhere at another time of day.
+    /// Nothing moves: everything rests at this share of the path. `None`: the position on the path depends on the
+    /// time of day.
     pub still: Option<f64>,
-    /// Columns and rows.
+    /// Columns and rows, px.
     pub size: [u32; 2],
-    /// An axis; none: a robot moves the sensor.
+    /// The axis that moves the parts; none: a robot moves the sensor.
     pub axis: Option<AxisKind>,
-    /// A scene file; the built-in board with parts where none is named.
+    /// A scene file; the built-in board with parts if not stated.
     pub scene: Option<PathBuf>,
-    /// The pictures' times are late by so much, ms.
+    /// Delay of the pictures' times, ms.
     pub delay_ms: f64,
     /// Exposure, us.
     pub exposure_us: f64,
-    /// An axis moves the board that it is calibrated from, in room light, in place of the scene under the laser.
+    /// Whether an axis moves the board of its calibration in room light, instead of the scene under the laser.
     pub board: bool,
 }
 
@@ -61,16 +62,16 @@ impl Default for SimSpec {
     }
 }
 
-/// Seconds in which the way's ends are left and reached.
+/// Time of acceleration and deceleration at the path's ends, s.
 const RAMP: f64 = 0.1;
-/// Steps that a turn, or a way, of an axis is told in; only their ends are used.
+/// Number of steps that an axis' turn or path is divided into; only the ends are used.
 const STEPS: usize = 200;
-/// Rays a pixel's side of pictures in room light; how bright a board's fields are, as paper and toner.
+/// Rays along each side of a pixel, for pictures in room light.
 const RAYS: u32 = 3;
 const WHITE: f64 = 0.85;
 const BLACK: f64 = 0.06;
 
-/// A simulated station whose parts or whose robot move: to and fro along a scan, or round and round.
+/// A simulated station whose parts or robot move: back and forth along a scan, or continuously around.
 #[derive(Clone)]
 pub struct SimMotion {
     /// The true station.
@@ -78,17 +79,17 @@ pub struct SimMotion {
     scene: Arc<Scene>,
     way: Way,
     speed: f64,
-    /// Share of the way at which it stands, where it does not move.
+    /// Share of the path at which it rests, if it does not move.
     still: Option<f64>,
-    /// The board is shown.
+    /// Whether the board is shown.
     board: bool,
 }
 
 #[derive(Clone)]
 enum Way {
-    /// The camera's first and last place over the scene.
+    /// The camera's first and last pose over the scene.
     Robot([Rigid<InScene, Camera>; 2]),
-    /// From one count to another.
+    /// The first and the last count.
     Axis(Arc<Ride>, [f64; 2]),
 }
 
@@ -144,7 +145,7 @@ impl SimMotion {
         Ok(SimMotion { station: station.into(), scene: scene.into(), way, speed, still, board })
     }
 
-    /// What moves, as meta.json says it.
+    /// What moves, as meta.json states it.
     pub fn motion(&self) -> Motion {
         match &self.way {
             Way::Robot(_) => Motion::default(),
@@ -152,14 +153,14 @@ impl SimMotion {
         }
     }
 
-    /// Share of the way at a host's time: to and fro, each end left and reached within [`RAMP`].
+    /// Share of the path at a host's time: back and forth, with acceleration and deceleration within [`RAMP`].
     fn share(&self, ns: u64, length: f64) -> f64 {
         if let Some(share) = self.still {
             return share;
         }
         let ramp = RAMP.min(0.5 * length / self.speed);
         let once = length / self.speed + ramp;
-        // Whole periods are taken off in whole ns: f64 does not hold a time of day.
+        // Whole periods are subtracted in integer ns: f64 cannot hold a time of day exactly enough.
         let t = (ns % (2.0 * once * 1e9) as u64) as f64 * 1e-9;
         let t = if t > once { 2.0 * once - t } else { t };
         let from_end = |t: f64| 0.5 * self.speed / ramp * t * t;
@@ -173,7 +174,7 @@ impl SimMotion {
         s / length
     }
 
-    /// Where the camera stood over the scene, and what a robot or an encoder would say.
+    /// Pose of the camera over the scene, and the position that a robot or an encoder would report.
     fn at(&self, ns: u64) -> (Rigid<InScene, Camera>, Stand) {
         match &self.way {
             Way::Robot([from, to]) => {
@@ -200,7 +201,7 @@ impl SimMotion {
         }
     }
 
-    /// What a robot or an encoder says at a host's time.
+    /// The position that a robot or an encoder reports at a host's time.
     pub fn stand(&self, ns: u64) -> Stand {
         self.at(ns).1
     }
@@ -213,7 +214,7 @@ pub struct SimCamera {
     hot: Vec<(usize, f32)>,
     start: u64,
     next: u64,
-    /// Pictures that began before this moment of the host's have this exposure, us.
+    /// Pictures that began before this host's time, ns, have this earlier exposure, us.
     former: (u64, f64),
 }
 
@@ -227,7 +228,7 @@ impl SimCamera {
         Ok(SimCamera { motion, spec: spec.clone(), hot, start: now_ns(), next: 0, former: (0, 0.0) })
     }
 
-    /// Of a picture that begins then, ns: a setting holds for what begins after it.
+    /// Exposure of a picture that begins at `begun`, ns: a setting applies to pictures that begin after it.
     fn exposure(&self, begun: u64) -> u64 {
         let (until, former) = self.former;
         (1e3 * if begun < until { former } else { self.spec.exposure_us }) as u64
@@ -237,7 +238,7 @@ impl SimCamera {
         let station = &*self.motion.station;
         let view = View { station, scene: &self.motion.scene, scene_from_camera };
         let (w, h) = (station.camera.width, station.camera.height);
-        // The sensor's figures are those of a millisecond.
+        // The sensor's light levels are stated for an exposure of a millisecond.
         let longer = (1e-6 * exposure as f64) as f32;
         let (mut light, leak) = (Canvas::new(w, h), station.sensor.ambient_leak);
         let (room, gain) = if self.motion.board {
@@ -274,7 +275,7 @@ impl PictureSource for SimCamera {
                     return Event::Quiet;
                 }
             }
-            // A sensor exposes whether or not somebody asks: what was not asked for in time is lost.
+            // The sensor exposes whether or not pictures are requested: those not requested in time are lost.
             self.next = self.next.max((now_ns() - exposure - self.start) / period);
         }
         let begun = if period > 0 { self.start + self.next * period } else { now };

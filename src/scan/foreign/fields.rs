@@ -1,6 +1,6 @@
 //! Reads single fields out of the records of a binary or text file.
 
-/// Kinds of numbers in records.
+/// Number types of record fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Number {
     I8,
@@ -25,7 +25,7 @@ impl Number {
         }
     }
 
-    /// The number that begins `bytes`, which hold at least as many as it has.
+    /// Reads the number at the beginning of `bytes`, which must hold at least its size.
     pub fn read(self, bytes: &[u8], big_endian: bool) -> f64 {
         let mut b = [0; 8];
         let n = self.bytes();
@@ -49,7 +49,7 @@ impl Number {
     }
 }
 
-/// Where x, y, z and the light stand among a record's fields.
+/// Indices of x, y, z and the intensity among a record's fields.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wanted {
     pub xyz: [usize; 3],
@@ -57,7 +57,7 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
-    /// `None` where a coordinate is missing. Names in capitals are taken where there are no small ones.
+    /// `None` if a coordinate is missing. An exact name is preferred; otherwise the case of letters is ignored.
     pub fn among<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Option<Wanted> {
         let at = |name: &str| {
             let any_case = || names.clone().position(|n| n.eq_ignore_ascii_case(name));
@@ -67,7 +67,7 @@ impl Wanted {
     }
 }
 
-/// Points of records, as they are read.
+/// Points collected while records are read.
 #[derive(Debug, Default)]
 pub(super) struct Points {
     pub points: Vec<[f64; 3]>,
@@ -80,7 +80,7 @@ impl Points {
         self.light.extend(wanted.light.map(|k| field(k) as f32));
     }
 
-    /// The fields of a text record; false where one is missing or no number.
+    /// Takes the fields of a text record; false if one is missing or is no number.
     pub fn take_text(&mut self, wanted: &Wanted, record: &[&str]) -> bool {
         let number = |k: usize| record.get(k).and_then(|t| t.parse::<f64>().ok());
         let needed = wanted.xyz.into_iter().chain(wanted.light);

@@ -1,6 +1,7 @@
-//! Makes of a foreign file, and of what its user states about it, a cloud in lines, as if a scan had made a shot of
-//! each. Places are in the file's own frame, mm. A height picture's x runs along its columns, z towards the sensor,
-//! and y makes the frame right-handed: against the rows of a picture that is seen from the sensor.
+//! Converts a foreign file, with what its user states about it, into a cloud of lines, as if a scan had made a shot
+//! of each line. Positions are in the file's own frame, mm. In a height picture x runs along the columns and z
+//! points towards the sensor. y makes the frame right-handed: it runs against the rows of a picture that is seen
+//! from the sensor.
 
 use super::missing;
 use super::raw::Raw;
@@ -9,32 +10,32 @@ use crate::fault::{Fault, Result};
 use crate::raster::{Kind, Says};
 use crate::scan::CloudPoint;
 
-/// The cloud, and what was found on the way.
+/// The cloud, with remarks on its conversion.
 #[derive(Clone, Debug)]
 pub struct Lines {
-    /// Line by line; `shot` is the line, `u` the place in it.
+    /// Points line by line; `shot` is the line's index, `u` the index within the line.
     pub points: Vec<CloudPoint>,
     /// Standard deviation that every point carries, mm.
     pub sigma_mm: f64,
-    /// Lines, and places in the longest.
+    /// Number of lines, and of positions in the longest one.
     pub size: [usize; 2],
-    /// What was done, a sentence each.
+    /// What was done to the data, a sentence each.
     pub notes: Vec<String>,
 }
 
-/// Columns of a line that `find` can take.
+/// Most positions of a line that `find` accepts.
 const MOST_PLACES: usize = 1 << 17;
-/// Farthest coordinate, mm: beyond it f32 forgets hundredths.
+/// Largest coordinate, mm: beyond it f32 cannot resolve hundredths.
 const FARTHEST_MM: f64 = 1e5;
 /// Smallest and largest unit of a file, mm: a nanometre, a kilometre.
 const UNITS_MM: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
-/// Fewer neighbours do not show how much heights scatter.
+/// With fewer neighbours the scatter of the heights cannot be estimated.
 const NEEDED: usize = 30;
 
-/// Makes lines of points; `light` are levels of light for a height picture, of the same size.
+/// Makes lines of points. `light` holds brightness levels for a height picture of the same size.
 ///
 /// # Errors
-/// What must be stated and is not, numbers out of all proportion, nothing measured at all.
+/// A value that must be stated and is not, numbers out of all proportion, no measured point.
 pub fn lines(raw: &Raw, light: Option<&Raw>, stated: &Stated) -> Result<Lines> {
     let unit = stated.unit_mm.ok_or_else(|| {
         Fault::usage("the unit of the heights is not stated")
@@ -85,7 +86,7 @@ pub fn lines(raw: &Raw, light: Option<&Raw>, stated: &Stated) -> Result<Lines> {
     finish(placed, stated, notes)
 }
 
-/// A point with its line and its place in the line.
+/// A point with the index of its line and its index in the line.
 type Placed = (u32, u32, [f64; 3], f32);
 
 /// A picture of heights.
@@ -96,7 +97,7 @@ struct Pixels<'a> {
     says: &'a Says,
 }
 
-/// What is stated about pictures does nothing to a cloud.
+/// Refuses options for pictures that would have no effect on a cloud.
 fn for_pictures_only(light: Option<&Raw>, stated: &Stated) -> Result<()> {
     let option = match () {
         () if light.is_some() => "--light",
@@ -142,7 +143,7 @@ fn picture(
     Ok(seen.map(|(i, v)| at(i, *v)).collect())
 }
 
-/// What the file says about itself, as far as it concerns people.
+/// Notes what the file states about itself, as far as it matters to the user.
 fn said(says: &Says, [dx, dy]: [f64; 2], stated: &Stated, notes: &mut Vec<String>) {
     notes.extend(says.notes.iter().cloned());
     if says.white_is_zero {
@@ -167,7 +168,7 @@ fn said(says: &Says, [dx, dy]: [f64; 2], stated: &Stated, notes: &mut Vec<String
     }
 }
 
-/// The levels of a picture of light: larger is brighter, not finite where nothing is known.
+/// The levels of an intensity picture: larger is brighter, not finite where the intensity is unknown.
 fn brightness(light: &Raw, [width, height]: [usize; 2]) -> Result<Vec<f32>> {
     let (levels, kind, says) = match light {
         Raw::Picture { width: w, height: h, levels, kind, says } if (*w, *h) == (width, height) => (levels, kind, says),
@@ -258,7 +259,7 @@ fn finish(mut placed: Vec<Placed>, stated: &Stated, mut notes: Vec<String>) -> R
             .cause("no sensor is so wide")
             .next("cut out the part that is to be searched"));
     }
-    // Lines ascend, places ascend in them; where two points fall into one place both stay in the cloud.
+    // Lines ascend, and indices ascend in them. If two points fall on one index, both stay in the cloud.
     placed.sort_by_key(|p| (p.0, p.1));
     let sigma_mm = match stated.sigma_mm {
         Some(s) => s,
@@ -281,8 +282,8 @@ fn finish(mut placed: Vec<Placed>, stated: &Stated, mut notes: Vec<String>) -> R
     Ok(Lines { points: placed.iter().map(point).collect(), sigma_mm, size, notes })
 }
 
-/// Robust standard deviation of one height: of three neighbours in a line the middle one is off the others' mean by
-/// sqrt(3/2) sigma; slopes cancel.
+/// Robust standard deviation of one height. Of three neighbours in a line, the middle one deviates from the mean of
+/// the others by sqrt(3/2) sigma; slopes cancel.
 fn scatter(placed: &[Placed]) -> Result<f64> {
     let neighbours = |w: &&[Placed]| w[0].0 == w[2].0 && w[1].1 == w[0].1 + 1 && w[2].1 == w[0].1 + 2;
     let bend = |w: &[Placed]| (w[1].2[2] - 0.5 * (w[0].2[2] + w[2].2[2])).abs();
@@ -297,6 +298,6 @@ fn scatter(placed: &[Placed]) -> Result<f64> {
     }
     let middle = bends.len() / 2;
     let median = *bends.select_nth_unstable_by(middle, f64::total_cmp).1;
-    // Never finer than the tenth of a micrometre that heights are kept to.
+    // Never finer than 0.1 µm, the resolution to which heights are stored.
     Ok((1.4826 * median / 1.5f64.sqrt()).max(1e-4))
 }

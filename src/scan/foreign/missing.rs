@@ -1,11 +1,12 @@
-//! Which numbers mean "not measured": what a person states, what the file says, and what looks as if nobody said it.
+//! Which numbers mean "not measured": those that the user states, those that the file states, and suspicious ones
+//! that nobody stated.
 
 use super::stated::Stated;
 use crate::fault::{Fault, Result};
 use crate::raster::{Kind, Says};
 use crate::solve::repeated;
 
-/// A number as people write it: -99.9999, not what 32 bits hold of it.
+/// Displays a number as people write it: -99.9999, not the exact value of its 32-bit float.
 struct Plain(f64);
 
 impl std::fmt::Display for Plain {
@@ -60,7 +61,7 @@ pub(super) fn of_picture(
     Ok(missing)
 }
 
-/// Whether a point of a cloud means "not measured": its z is the stated one.
+/// A test of whether a point of a cloud was measured: its coordinates are finite and its z is not the stated level.
 pub(super) fn of_cloud<'a>(
     stated: &Stated,
     points: &'a [[f64; 3]],
@@ -81,7 +82,7 @@ pub(super) fn of_cloud<'a>(
     there
 }
 
-/// Names numbers that look as if they stood for "not measured", which nobody has stated.
+/// Notes numbers that look like a mark for "not measured" although nobody stated it.
 pub(super) fn suspects(
     stated: &Stated,
     heights: impl Iterator<Item = f64> + Clone,

@@ -1,4 +1,4 @@
-//! In: height maps and clouds that other sensors and programs wrote. Out: the same points as a scan's, line by line.
+//! In: height maps and clouds that other sensors and programs wrote. Out: their points in lines, as a scan's.
 //! Frame and unit: files in their own frame and unit, which the caller states; points in that frame, mm.
 
 mod fields;

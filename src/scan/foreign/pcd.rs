@@ -1,4 +1,4 @@
-//! Reads a PCD (Point Cloud Library), text, binary or compressed: its points, in lines where it is organised.
+//! Reads a PCD (Point Cloud Library): text, binary or compressed. Its points come in lines if it is organised.
 
 use super::fields::{Number, Points, Wanted};
 use super::raw::{MOST_POINTS, Raw};
@@ -13,7 +13,7 @@ fn strange(what: impl std::fmt::Display) -> Fault {
         .next("write the cloud again with the Point Cloud Library, or export it as PLY")
 }
 
-/// Whether a file begins as one does, comments apart.
+/// Whether a file begins like a PCD, comments ignored.
 pub(super) fn begins(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(4096)];
     let mut lines = head.split(|&b| b == b'\n').skip_while(|l| l.starts_with(b"#") || l.trim_ascii().is_empty());
@@ -26,7 +26,7 @@ struct Header {
     names: Vec<String>,
     /// Bytes of one number of each field.
     sizes: Vec<usize>,
-    /// What kind of number it is; `None` for kinds that are known by their size alone.
+    /// Number type of each field; `None` for types that are known by their size alone.
     numbers: Vec<Option<Number>>,
     counts: Vec<usize>,
     width: usize,
@@ -137,7 +137,8 @@ fn header(bytes: &[u8]) -> Result<(Header, usize)> {
     Ok((h, at))
 }
 
-/// Where the sensor stood: programs do not agree whether the points are moved there already, so it must be the origin.
+/// Checks the sensor's pose. Programs disagree on whether the points are already transformed by it, so it must be
+/// the origin.
 fn viewed(words: &[&str]) -> Result<()> {
     let numbers: Vec<f64> = words.iter().filter_map(|w| w.parse().ok()).collect();
     let none = numbers.iter().all(|v| *v == 0.0);
@@ -165,8 +166,8 @@ fn number(kind: char, size: usize) -> Option<Number> {
     })
 }
 
-/// LZF: a control byte below 32 is followed by one byte more than it says as they are; others repeat what was written
-/// before: length in the upper three bits (7: another byte adds to it), distance in the lower five and the byte after.
+/// LZF: a control byte c below 32 is followed by c + 1 literal bytes. Other control bytes repeat earlier output:
+/// length in the upper three bits (7: another byte adds to it), distance in the lower five bits and the byte after.
 fn unpack(packed: &[u8], length: usize) -> Option<Vec<u8>> {
     let mut out = Vec::with_capacity(length.min(packed.len().saturating_mul(264)));
     let mut bytes = packed.iter().map(|&b| usize::from(b));
@@ -197,7 +198,7 @@ mod tests {
 
     #[test]
     fn repeats_are_unpacked_and_damage_is_refused() {
-        // "abc" as it is, then six bytes from three back: abcabcabc.
+        // "abc" literally, then six bytes from three back: abcabcabc.
         let packed = [2, b'a', b'b', b'c', 4 << 5, 2];
         assert_eq!(unpack(&packed, 9).unwrap(), b"abcabcabc");
         // A long repeat: 7 + 3 + 2 bytes from one back.

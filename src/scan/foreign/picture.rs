@@ -1,4 +1,4 @@
-//! Reads a picture whose pixels are heights, or the light beside them: its numbers as they are written.
+//! Reads a picture whose pixels are heights, or the intensities that belong to them: its numbers as written.
 
 use super::raw::{MOST_POINTS, Raw};
 use crate::fault::{Fault, Result};

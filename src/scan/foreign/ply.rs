@@ -17,7 +17,7 @@ enum Layout {
 #[derive(Clone, Copy)]
 enum Holds {
     One(Number),
-    /// How many items follow, then the items.
+    /// The number of items, then the items.
     List {
         count: Number,
         item: Number,
@@ -31,12 +31,13 @@ struct Element {
 }
 
 impl Element {
-    /// Bytes of every record, where no list makes them differ.
+    /// Bytes of a record; `None` if a list makes the length vary.
     fn size(&self) -> Option<usize> {
         self.properties.iter().map(|p| if let Holds::One(n) = p.0 { Some(n.bytes()) } else { None }).sum()
     }
 
-    /// Where the properties of the record that begins `bytes` begin, into `offsets`; gives the record's length.
+    /// Writes into `offsets` where the properties of the record at the beginning of `bytes` start; returns the
+    /// record's length.
     fn places(&self, bytes: &[u8], big_endian: bool, offsets: &mut Vec<usize>) -> Option<usize> {
         offsets.clear();
         let mut at = 0usize;
@@ -46,7 +47,7 @@ impl Element {
                 Holds::One(n) => n.bytes(),
                 Holds::List { count, item } => {
                     let n = count.read(bytes.get(at..at + count.bytes())?, big_endian);
-                    // A list is within the file.
+                    // A list must fit into the file.
                     let n = (n >= 0.0 && n <= bytes.len() as f64).then_some(n as usize)?;
                     count.bytes() + n * item.bytes()
                 }
@@ -55,7 +56,7 @@ impl Element {
         (at <= bytes.len()).then_some(at)
     }
 
-    /// The same for a record of words: which word each property begins with.
+    /// As [`Element::places`], for a record of words: the index of each property's first word.
     fn words(&self, words: &[&str], offsets: &mut Vec<usize>) -> Option<()> {
         offsets.clear();
         let mut at = 0usize;

@@ -1,4 +1,4 @@
-//! What a foreign file holds: numbers, with no unit given to them yet.
+//! What a foreign file holds: numbers, to which no unit is assigned yet.
 
 use crate::raster::{Kind, Says};
 
@@ -13,18 +13,18 @@ pub enum Raw {
         height: usize,
         /// Row by row, as written; NaN where the file hides a pixel.
         levels: Vec<f64>,
-        /// What kind of numbers they are; whole ones cannot say by themselves that a value is missing.
+        /// Their number type; whole numbers cannot mark a missing value by themselves, as NaN does.
         kind: Kind,
-        /// What the file says about them, which is not applied yet.
+        /// What the file states about them; not applied yet.
         says: Says,
     },
     /// Points in the order of the file; a missing one has a coordinate that is not finite.
     Points {
-        /// Points a line, where the file is organised in lines of one length.
+        /// Points per line, if the file is organised in lines of equal length.
         line: Option<usize>,
         /// Coordinates.
         points: Vec<[f64; 3]>,
-        /// A level of light for each point, where the file has one.
+        /// An intensity for each point, if the file holds intensities.
         intensity: Option<Vec<f32>>,
     },
 }

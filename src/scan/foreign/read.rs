@@ -1,21 +1,21 @@
-//! Reads a height picture, a PLY or a PCD by what it begins with.
+//! Reads a height picture, a PLY or a PCD; the first bytes decide which.
 
 use super::raw::Raw;
 use super::{pcd, picture, ply};
 use crate::fault::{Fault, Result};
 
-/// Reads a file by what it begins with.
+/// Reads a file whose first bytes decide its format.
 ///
 /// # Errors
-/// Other files, damaged ones, more than 64 million points, several pages.
+/// Files of other formats, damaged files, more than 64 million points, several pages.
 pub fn read_foreign(bytes: &[u8]) -> Result<Raw> {
     read_foreign_page(bytes, None)
 }
 
-/// Reads a file of which `page`, counted from 1, is meant.
+/// Reads page `page`, counted from 1, of a file.
 ///
 /// # Errors
-/// As [`read_foreign`]; a page that is not there.
+/// As [`read_foreign`]; a page that does not exist.
 pub fn read_foreign_page(bytes: &[u8], page: Option<usize>) -> Result<Raw> {
     let cloud = match () {
         () if bytes.starts_with(b"ply") => ply::read(bytes),

@@ -1,5 +1,5 @@
-//! In: a height map. Out: float TIFFs, a 16-bit PNG with its scale beside it, pictures for people; and
-//! the height map back from them.
+//! In: a height map. Out: float TIFFs, a 16-bit PNG with its scale beside it, pictures for viewing; and the height
+//! map read back from them.
 //! Frame and unit: heights in mm above the grid's plane; file row 0 is the smallest y (docs/file-formats.md).
 
 use super::picture::Shown;
@@ -25,7 +25,7 @@ pub struct MapScale {
     pub height: u32,
     /// Edge of a cell, mm.
     pub cell_mm: f64,
-    /// Where the grid stands in the cloud's frame, mm; its origin is the outer corner of cell (0, 0).
+    /// Pose of the grid in the cloud's frame, mm; its origin is the outer corner of cell (0, 0).
     #[serde(rename = "base_T_grid")]
     pub base_from_grid: Rigid<Base, Grid>,
     /// height.png: z = offset_mm + step_mm · (value - 1); value 0 is missing.
@@ -34,13 +34,13 @@ pub struct MapScale {
     pub png_step_mm: f64,
     /// Value of height.png where nothing was measured: 0.
     pub png_missing: u16,
-    /// Where the centre of the pixel in column i and row j lies in the grid frame.
+    /// States where the centre of the pixel in column i and row j lies in the grid frame.
     pub pixel_centre: String,
 }
 
-/// Most bytes of one of a map's files: 64 million cells of 4 bytes, and what stands before them.
+/// Most bytes of one of a map's files: 64 million cells of 4 bytes, and the file's header.
 const MOST_BYTES: u64 = (4 << 26) + (1 << 20);
-/// What [`HeightMap::save`] writes.
+/// The files that [`HeightMap::save`] writes.
 pub const MAP_FILES: [&str; 10] = [
     "height_picture.png",
     "intensity_picture.png",
@@ -85,7 +85,7 @@ impl HeightMap {
     /// 16-bit heights with their scale: 1..=65535 spans the map, 0 is missing.
     pub fn to_u16(&self) -> (MapScale, Vec<u16>) {
         let (low, high) = self.quantiles(0.0, 1.0).unwrap_or((0.0, 0.0));
-        // A tenth of a micrometre at least, so that a flat map does not blow up its noise.
+        // At least 0.1 µm, so that a flat map does not magnify its noise.
         let step = (f64::from(high - low) / 65_534.0).max(1e-4);
         let value = |z: &f32| {
             if z.is_finite() { ((f64::from(*z) - f64::from(low)) / step).round() as u16 + 1 } else { 0 }
@@ -128,7 +128,7 @@ impl HeightMap {
             }
             Ok(values)
         };
-        // Before memory is asked for: the planes are as large as the files that hold them.
+        // Read before the map's memory is allocated: the planes are only as large as the files that hold them.
         let (z, intensity, sigma) = (plane("height.tif")?, plane("intensity.tif")?, plane("sigma.tif")?);
         let size = [scale.width, scale.height];
         let counts = crate::raster::load_sized(&folder.join("count.png"), Default::default(), 16, size)?;

@@ -1,6 +1,6 @@
 //! In: points, twice in any order. Out: the cells of a height map, filled by the grid stages on a GPU or by their
-//! twins.
-//! Frame and unit: grid frame; whole steps until the means, then mm and grey levels.
+//! CPU twins.
+//! Frame and unit: grid frame; whole steps until the means are taken, then mm and grey levels.
 
 use crate::fault::{Fault, Result};
 use crate::gpu::{Buffer, Device, Recording, Replay};
@@ -43,7 +43,7 @@ struct Gpu {
 }
 
 impl Filling {
-    /// On `device` where its buffers can hold the grid.
+    /// Runs on `device` if its buffers can hold the grid.
     pub fn new(spec: &GridSpec, min_quality: f32, device: Option<&Device>) -> Result<Filling> {
         let size = [spec.width, spec.height];
         let steps = (spec.cell, f64::from(spec.z_step));
@@ -71,7 +71,7 @@ impl Filling {
         Ok(())
     }
 
-    /// Means of the sums. Refuses cells with more points than sums of whole numbers can take.
+    /// Computes the means of the sums. Refuses cells with more points than the integer sums can hold.
     pub fn resolve(self, spec: &GridSpec) -> Result<HeightMap> {
         let frame = self.frame;
         let cells: Vec<Layer> = match self.place {
@@ -108,7 +108,7 @@ impl Gpu {
         let n = frame.cells() as u64;
         let uniform = device.storage("grid frame", size_of::<GridFrame>() as u64)?;
         let records = device.storage("cloud points", (CHUNK * size_of::<CloudPoint>()) as u64)?;
-        // A new buffer is zero, which is an empty cell.
+        // A new buffer is zeroed, and zeros are an empty cell.
         let span_of = device.storage("grid span", 8 * n)?;
         let layers = device.storage("grid layers", 32 * n)?;
         let cells = device.storage("grid cells", 16 * n)?;

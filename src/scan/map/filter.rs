@@ -1,15 +1,15 @@
-//! In: a height map, filters in their order. Out: the same map without the cells that they take away. A filter takes
-//! away and never makes up: what stays is as it was measured.
+//! In: a height map and filters in their order. Out: the same map without the cells that the filters remove. A
+//! filter only removes cells; the others keep their measured values.
 //! Frame and unit: grid frame, mm from the grid's corner; heights above the grid's plane.
 
 use super::heightmap::HeightMap;
 use crate::fault::{Fault, Result};
 
-/// What is taken away.
+/// Which cells a filter removes.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(tag = "filter", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Filter {
-    /// Cells whose stated standard deviation is larger.
+    /// Cells whose stated standard deviation exceeds a limit.
     Sigma {
         /// mm, > 0.
         most_mm: f64,
@@ -21,31 +21,31 @@ pub enum Filter {
         /// mm, > low.
         high_mm: f64,
     },
-    /// What lies in a box.
+    /// Cells inside a box.
     Cut {
         /// Two opposite corners: x0 y0 x1 y1, mm.
         corners: [f64; 4],
     },
-    /// What lies outside a box.
+    /// Cells outside a box.
     Keep {
         /// Two opposite corners: x0 y0 x1 y1, mm.
         corners: [f64; 4],
     },
-    /// Pieces of surface of fewer cells: glints, dust, what shines through a hole. A piece ends at a step.
+    /// Pieces of surface with few cells: glints, dust, light through a hole. A piece ends at a step.
     Islands {
-        /// Fewer than so many go, 2 to 1 000 000.
+        /// Pieces with fewer cells are removed, 2 to 1 000 000.
         least_cells: u32,
-        /// Neighbours that differ by more than this are of two pieces, mm, > 0.
+        /// Neighbours that differ by more than this belong to different pieces, mm, > 0.
         step_mm: f64,
     },
 }
 
-/// Filters of one map at most.
+/// Most filters of one map.
 pub const MOST_FILTERS: usize = 64;
 const MOST_CELLS: u32 = 1_000_000;
 
 impl Filter {
-    /// Refuses numbers that mean nothing.
+    /// Refuses numbers out of range.
     pub fn check(&self) -> Result<()> {
         let finite = |v: &[f64]| v.iter().all(|v| v.is_finite());
         let wrong = match self {
@@ -72,7 +72,7 @@ impl Filter {
         Err(Fault::usage(wrong).next("correct the filter"))
     }
 
-    /// Takes cells away; how many.
+    /// Removes cells and returns their number.
     pub fn apply(&self, map: &mut HeightMap) -> usize {
         let goes: Vec<bool> = match self {
             Filter::Sigma { most_mm } => map.sigma.iter().map(|s| f64::from(*s) > *most_mm).collect(),
@@ -92,8 +92,8 @@ impl Filter {
     }
 }
 
-/// `sigma:0.05`, `heights:-1,4`, `cut:10,10,20,20`, `keep:0,0,50,30`, `islands:20,0.5`: lengths in mm, islands in
-/// cells first.
+/// `sigma:0.05`, `heights:-1,4`, `cut:10,10,20,20`, `keep:0,0,50,30`, `islands:20,0.5`: lengths in mm; islands take
+/// the number of cells first.
 impl std::str::FromStr for Filter {
     type Err = String;
 
@@ -119,15 +119,15 @@ impl std::str::FromStr for Filter {
     }
 }
 
-/// Which cells' centres lie in a box.
+/// The cells whose centres lie in a box.
 fn inside(map: &HeightMap, c: &[f64; 4]) -> Vec<bool> {
     let within = |i: u32, a: f64, b: f64| (a.min(b)..=a.max(b)).contains(&((f64::from(i) + 0.5) * map.cell));
     let columns: Vec<bool> = (0..map.width).map(|x| within(x, c[0], c[2])).collect();
     (0..map.height).flat_map(|y| columns.iter().map(move |x| *x && within(y, c[1], c[3]))).collect()
 }
 
-/// Which cells belong to a piece of fewer than so many: pieces of neighbours, also across corners, that differ by no
-/// more than a step.
+/// The cells of pieces with fewer than `least` cells. A piece consists of neighbours, also across corners, that
+/// differ by no more than `step`.
 fn small(map: &HeightMap, least: usize, step: f32) -> Vec<bool> {
     let (w, h) = (map.width as usize, map.height as usize);
     let (mut seen, mut goes) = (vec![false; map.z.len()], vec![false; map.z.len()]);
@@ -164,8 +164,8 @@ mod tests {
     use super::*;
     use crate::geometry::Rigid;
 
-    /// A slope that rises by 0.1 a cell, a block of 10 x 10 cells 5 mm above it, 3 glints and a pair of cells off in
-    /// the air.
+    /// A slope that rises by 0.1 a cell, a block of 10 x 10 cells 5 mm above it, 3 glints, and a pair of cells off
+    /// the surface.
     fn map() -> HeightMap {
         let mut map = HeightMap::empty(60, 40, 0.5, Rigid::identity());
         for i in 0..map.z.len() {
@@ -207,7 +207,7 @@ mod tests {
         assert!(m.z[7].is_nan() && m.intensity[7].is_nan() && m.sigma[7].is_nan() && m.count[7] == 0);
         assert_eq!(Filter::Sigma { most_mm: 0.1 }.apply(&mut m), 0, "what is gone goes once");
         assert_eq!(Filter::Heights { low_mm: -1.0, high_mm: 15.0 }.apply(&mut m), 5);
-        // Columns 4 to 7, rows 0 to 1, one of which has gone.
+        // Columns 4 to 7, rows 0 to 1; one cell was removed before.
         assert_eq!(Filter::Cut { corners: [4.0, 1.0, 2.0, 0.0] }.apply(&mut m), 7);
         let left = m.z.iter().filter(|z| z.is_finite()).count();
         assert_eq!(Filter::Keep { corners: [10.0, 5.0, 15.0, 10.0] }.apply(&mut m), left - 99);

@@ -1,5 +1,5 @@
-//! In: a cloud (in memory or on disk) and a choice of grid. Out: a height map whose cells hold the mean
-//! of their points (stages::grid); a cell with two surfaces takes the one with more points.
+//! In: a cloud (in memory or on disk) and a choice of grid. Out: a height map whose cells hold the mean of their
+//! points (stages::grid). A cell with two surfaces takes the one with more points.
 //! Frame and unit: points in the base frame, mm; the grid's frame is the scan's best plane unless given.
 
 use super::filling::{Filling, Pass};
@@ -8,7 +8,7 @@ use crate::fault::Result;
 use crate::gpu::Device;
 use crate::scan::{HeightMap, PointSource};
 
-/// Grids a cloud with the twins. Refuses an empty one, and grids of more than 64 million cells.
+/// Grids a cloud on the CPU. Refuses an empty cloud and grids of more than 64 million cells.
 pub fn grid(source: &(impl PointSource + ?Sized), options: &GridOptions) -> Result<HeightMap> {
     grid_on(source, options, None)
 }

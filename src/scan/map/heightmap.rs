@@ -13,7 +13,7 @@ pub struct HeightMap {
     pub height: u32,
     /// Edge of a cell, mm.
     pub cell: f64,
-    /// Where the grid stands in the cloud's frame, mm; its origin is the outer corner of cell (0, 0).
+    /// Pose of the grid in the cloud's frame, mm; its origin is the outer corner of cell (0, 0).
     pub base_from_grid: Rigid<Base, Grid>,
     /// Height, mm; NaN where nothing was measured.
     pub z: Vec<f32>,
@@ -21,7 +21,7 @@ pub struct HeightMap {
     pub count: Vec<u32>,
     /// Mean stripe amplitude, grey levels; NaN where nothing was measured.
     pub intensity: Vec<f32>,
-    /// Standard deviation of the height from the points' own sigmas, mm; NaN where nothing was measured.
+    /// Standard deviation of the height, derived from the points' own sigmas, mm; NaN where nothing was measured.
     pub sigma: Vec<f32>,
 }
 
@@ -61,7 +61,7 @@ impl HeightMap {
     }
 }
 
-/// The values below which the given shares of the finite ones lie; `None` where none is finite.
+/// The values below which the given shares of the finite values lie; `None` if none is finite.
 pub(in crate::scan) fn quantiles(values: &[f32], low: f64, high: f64) -> Option<(f32, f32)> {
     let mut finite: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
     let last = finite.len().checked_sub(1)?;

@@ -1,5 +1,5 @@
-//! In: a height map. Out: colour pictures for people: heights with hillshade, intensity, sigma,
-//! coverage, each with a scale in numbers and a length bar.
+//! In: a height map. Out: colour pictures for viewing: heights with hillshade, intensity, sigma, coverage, each with
+//! a numeric scale and a length bar.
 //! Frame and unit: the grid seen from above, x to the right, y up; mm and grey levels on the scales.
 
 use super::heightmap::quantiles;
@@ -9,7 +9,7 @@ use crate::scan::HeightMap;
 /// Which of a height map's values is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
-    /// Above the grid's plane, mm; with hillshade.
+    /// Height above the grid's plane, mm; with hillshade.
     Height,
     /// Mean stripe amplitude, grey levels.
     Intensity,
@@ -19,11 +19,11 @@ pub enum Shown {
     Coverage,
 }
 
-/// Cells without a measurement.
+/// Colour of cells without a measurement.
 const MISSING: Rgb = [38, 42, 50];
 const PAPER: Rgb = [18, 20, 24];
 const INK: Rgb = [226, 230, 235];
-/// The map is enlarged by whole steps until it is at least this wide, px.
+/// The map is enlarged by an integer factor until it is at least this wide, px.
 const WIDE: u32 = 900;
 
 impl HeightMap {
@@ -36,8 +36,8 @@ impl HeightMap {
         }
     }
 
-    /// The picture, and where cell (0, 0)'s outer corner lies in it with the pixels per cell: a mark at
-    /// grid (x, y) mm belongs at pixel (ox + x / cell · scale, oy - y / cell · scale).
+    /// The picture, and the pixel of the outer corner of cell (0, 0) with the pixels per mm. A mark at grid (x, y)
+    /// mm belongs at the pixel that [`MapPlace::pixel`] gives.
     pub fn picture(&self, what: Shown) -> (RgbImage, MapPlace) {
         let values = self.shown(what);
         let (low, high) = span(&values, what);
@@ -74,7 +74,7 @@ impl HeightMap {
         (picture, MapPlace { origin: (left as f64, (top + h) as f64), pixels_per_mm: f64::from(scale) / self.cell })
     }
 
-    /// Light from the upper left on the slope of a cell, 0.6 to 1.2; flat ground is 1.
+    /// Hillshade factor of a cell, with light from the upper left, 0.6 to 1.2; flat ground is 1.
     fn slope_light(&self, ix: i64, iy: i64) -> f32 {
         let Some(here) = self.get(ix, iy) else { return 1.0 };
         let rise = |dx: i64, dy: i64| match (self.get(ix + dx, iy + dy), self.get(ix - dx, iy - dy)) {
@@ -99,18 +99,18 @@ pub struct MapPlace {
 }
 
 impl MapPlace {
-    /// Pixel of a place on the grid, mm.
+    /// Pixel of a position on the grid, mm.
     pub fn pixel(&self, x: f64, y: f64) -> (f64, f64) {
         (self.origin.0 + x * self.pixels_per_mm, self.origin.1 - y * self.pixels_per_mm)
     }
 }
 
-/// The values between which 99 % of the cells lie; from zero where zero means something.
+/// The range that holds 99 % of the cells' values; it starts at zero except for heights.
 fn span(values: &[f32], what: Shown) -> (f32, f32) {
     let Some((low, high)) = quantiles(values, 0.005, 0.995) else { return (0.0, 1.0) };
     let low = if what == Shown::Height { low } else { 0.0 };
     let high = if high > low { high } else { low + 1.0 };
-    // The lowest tenth of the colours is nearly black: a plate that fills the map shall not be lost in it.
+    // The lowest tenth of the colours is nearly black: a plate that fills the map must stay visible.
     (if what == Shown::Height { low - 0.12 * (high - low) } else { low }, high)
 }
 
@@ -126,7 +126,7 @@ fn round_number(most: f64) -> f64 {
 
 fn number(v: f64, step: f64) -> String {
     let digits = (-step.log10().floor()).max(0.0) as usize;
-    // -0 is 0 to a person.
+    // Print -0 as 0.
     format!("{:.digits$}", if v.abs() < step / 1e3 { 0.0 } else { v })
 }
 
@@ -176,7 +176,7 @@ mod tests {
         let at = |x: f64, y: f64| picture.pixels[y as usize * picture.width as usize + x as usize];
         let (high, low) = (at(x, y), at(place.pixel(5.0, 5.0).0, place.pixel(5.0, 5.0).1));
         assert!(high[0] > 150 && low[0] < 100, "{high:?} {low:?}");
-        // A low y is low in the picture.
+        // A low y is at the bottom of the picture.
         assert!(y > f64::from(picture.height) / 2.0);
     }
 

@@ -11,20 +11,21 @@ use rand::{Rng, SeedableRng};
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GridOptions {
-    /// Edge of a cell, mm, 0.0001..=500; by default about 1.5 points a cell, to half a unit of its first digit.
+    /// Edge of a cell, mm, 0.0001..=500; by default about 1.5 points a cell, rounded to half a unit of its first
+    /// digit.
     #[serde(rename = "cell_mm")]
     pub cell: Option<f64>,
-    /// Where the grid lies; by default the scan's best plane, x along the base's x.
+    /// Pose of the grid; by default the scan's best plane, with x along the base's x.
     pub base_from_grid: Option<Rigid<Base, Grid>>,
-    /// Cells [x, y]; by default what the points need.
+    /// Number of cells [x, y]; by default enough to hold the points.
     pub cells: Option<[u32; 2]>,
-    /// Points farther apart than this in one cell belong to two surfaces, mm, 0.0001..=100; by default the rise of a
-    /// slope of 31 degrees over a cell, and not less than six of the points' own standard deviations.
+    /// Points of one cell that are farther apart than this belong to two surfaces, mm, 0.0001..=100. By default the
+    /// rise of a slope of 31 degrees over a cell, and at least six of the points' own standard deviations.
     #[serde(rename = "layer_mm")]
     pub layer: Option<f64>,
-    /// Points of less quality are left out, 0..=1.
+    /// Points of lower quality are excluded, 0..=1.
     pub min_quality: f32,
-    /// A direction in the base frame that "up" shall agree with: towards the camera.
+    /// A direction in the base frame that the grid's "up" must agree with: towards the camera.
     pub up: Vec3,
 }
 
@@ -37,10 +38,10 @@ impl Default for GridOptions {
 /// Most cells a height map may have: 64 M cells take 4 GB while they are filled.
 pub const MOST_CELLS: u64 = 1 << 26;
 
-/// Most cells of a map whose cell nobody chose, however long the scan: 240 MB while they are filled.
+/// Most cells of a map whose cell size nobody chose, however long the scan: 240 MB while they are filled.
 pub const FEW_CELLS: u64 = 1 << 22;
 
-/// Steeper than this is a step between two surfaces, mm per mm.
+/// A steeper rise counts as a step between two surfaces, mm per mm.
 pub const SLOPE: f64 = 0.6;
 
 impl GridOptions {
@@ -70,23 +71,23 @@ impl GridOptions {
 /// Where the cells lie and how heights become integers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GridSpec {
-    /// Where the grid stands in the cloud's frame, mm; its origin is the outer corner of cell (0, 0).
+    /// Pose of the grid in the cloud's frame, mm; its origin is the outer corner of cell (0, 0).
     pub base_from_grid: Rigid<Base, Grid>,
     /// Columns: cells along the grid's x.
     pub width: u32,
     /// Rows: cells along the grid's y.
     pub height: u32,
-    /// mm
+    /// Edge of a cell, mm.
     pub cell: f64,
     /// Height of one integer step, mm; 16-bit heights times 65,535 points stay within 32 bits.
     pub z_step: f32,
-    /// Two surfaces where a cell spans more integer steps than this.
+    /// A cell that spans more integer steps than this holds two surfaces.
     pub layer_steps: i32,
     /// Largest intensity of the points, grey levels.
     pub most_intensity: f32,
 }
 
-/// Works out frame, extent, cell and height step from the points and what the options leave open.
+/// Chooses frame, extent, cell and height step from the points, as far as the options do not set them.
 pub fn choose(source: &(impl PointSource + ?Sized), options: &GridOptions) -> Result<GridSpec> {
     let sample = sample(source, options.min_quality)?;
     if sample.points.len() < 3 {
@@ -100,7 +101,7 @@ pub fn choose(source: &(impl PointSource + ?Sized), options: &GridOptions) -> Re
     };
     let grid_from_base = base_from_grid.inverse();
     let local: Vec<Vec3> = sample.points.iter().map(|p| grid_from_base.point(p)).collect();
-    // All points lie within the sample's extent but for the thin margin that a sample can miss.
+    // All points lie within the sample's extent, except for a thin margin that a sample can miss.
     let [(x0, x1), (y0, y1), (z0, z1)] = extents(&local);
     let area = ((x1 - x0) * (y1 - y0)).max(1e-12);
     let cell = options.cell.unwrap_or_else(|| {
@@ -147,8 +148,8 @@ pub struct Sample {
     most_intensity: f32,
 }
 
-/// Up to 200,000 points, evenly through the source; the extreme points of every chunk are among them,
-/// so that the extent is that of the whole cloud.
+/// Up to 200,000 points, taken evenly from the source. They include the extreme points of every chunk, so that the
+/// extent is that of the whole cloud.
 pub fn sample(source: &(impl PointSource + ?Sized), min_quality: f32) -> Result<Sample> {
     const MOST: usize = 200_000;
     let mut sigmas = Vec::new();
@@ -193,7 +194,7 @@ pub fn sample(source: &(impl PointSource + ?Sized), min_quality: f32) -> Result<
     Ok(out)
 }
 
-/// Extents along x, y, z. 0.02 % of the points on either side may be strays and do not widen the grid.
+/// Extents along x, y, z. Up to 0.02 % of the points on either side may be outliers, which do not widen the grid.
 pub fn extents(points: &[Vec3]) -> [(f64, f64); 3] {
     let of = |axis: usize| {
         let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
@@ -203,16 +204,16 @@ pub fn extents(points: &[Vec3]) -> [(f64, f64); 3] {
     };
     let all = [of(0), of(1), of(2)];
     let largest = all.iter().map(|[_, low, high, _]| high - low).fold(0.0, f64::max);
-    // Strays are those that leave a gap; a dense edge is kept whole.
+    // Outliers are points beyond a gap; a dense edge stays complete.
     all.map(|[least, low, high, most]| {
         let margin = 0.01 * (high - low) + 0.005 * largest;
         (least.max(low - margin), most.min(high + margin))
     })
 }
 
-/// The scan's best plane: the one with most points near it (seeded consensus over 400 triples), then least squares over
-/// its points. x is the base's x laid into the plane, z points `up`. Near is six of the points' own standard
-/// deviations, and where those are small a five-hundredth of the scan's size: boards and tables are flat to that.
+/// The scan's best plane: the one with most points near it (seeded consensus over 400 triples), then least squares
+/// over its points. x is the base's x projected into the plane, z points `up`. "Near" is six of the points' own
+/// standard deviations, and at least a five-hundredth of the scan's size: boards and tables are flat to that.
 pub fn best_frame(sample: &Sample, up: &Vec3) -> Result<Rigid<Base, Grid>> {
     let points = &sample.points;
     let size = extents(points).iter().map(|(a, b)| b - a).fold(0.0, f64::max);
@@ -229,7 +230,7 @@ pub fn best_frame(sample: &Sample, up: &Vec3) -> Result<Rigid<Base, Grid>> {
     for _ in 0..400 {
         let [a, b, c] = std::array::from_fn(|_| probe[rng.random_range(0..probe.len())]);
         let normal = (b - a).cross(&(c - a));
-        // A sliver of a triangle says nothing about the plane's tilt.
+        // A sliver of a triangle does not determine the plane's tilt.
         if normal.norm() < 1e-2 * (b - a).norm() * (c - a).norm() {
             continue;
         }

@@ -1,5 +1,6 @@
-//! In: a whole scan's cloud, where the camera was reported at its shots. Out: the same without what the lines of the
-//! cloud show to be wrong with each other: places that scatter, light that brightness pulls.
+//! In: a whole scan's cloud and the reported camera pose at each shot. Out: the same cloud, corrected for errors
+//! that its lines show relative to each other: scatter of the poses, and shifts of the light caused by the surface's
+//! brightness.
 //! Frame and unit: the cloud's frame, mm.
 
 mod path;

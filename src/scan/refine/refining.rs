@@ -1,22 +1,22 @@
-//! Takes out of a whole cloud what its own lines show to be wrong: the scatter of the reported places, then what the
-//! sheet's thickness does. Points are in the cloud's frame, mm.
+//! Removes from a whole cloud the errors that its own lines show: first the scatter of the reported poses, then the
+//! shifts caused by the sheet's thickness. Points are in the cloud's frame, mm.
 
 use super::{PathFound, SheetFound, Straight, Thick, straight};
 use crate::capture::Format;
 use crate::fault::Result;
 use crate::scan::{Along, CloudPoint, Extraction, PointSource, Shots};
 
-/// What a cloud's lines show to be wrong with each other, as far as the settings ask for it.
+/// Errors that a cloud's lines show relative to each other, as far as the settings ask for them.
 pub struct Refining {
-    /// How the reported places scatter, where a surface shows it.
+    /// Scatter of the reported poses, if a surface shows it.
     pub places: Option<PathFound>,
-    /// The shots where the cloud shows that the camera was.
+    /// The shots with the camera poses that the cloud shows.
     pub shots: Shots,
     path: Option<Straight>,
     thick: Option<Thick>,
 }
 
-/// A cloud with its shots on the path that the camera went.
+/// A cloud with its shots moved to the camera's path.
 struct OnPath<'a> {
     cloud: &'a dyn PointSource,
     path: Option<&'a Straight>,
@@ -36,7 +36,7 @@ impl PointSource for OnPath<'_> {
 }
 
 impl Refining {
-    /// Looks at a cloud in the order of its shots; `shots` says where they were reported.
+    /// Examines a cloud in the order of its shots; `shots` holds their reported poses.
     ///
     /// # Errors
     /// Those of reading the cloud.
@@ -51,17 +51,17 @@ impl Refining {
         Ok(Refining { places, shots, path, thick })
     }
 
-    /// Whether the points become others.
+    /// Whether any point is changed.
     pub fn changes(&self) -> bool {
         self.path.is_some() || self.thick.is_some()
     }
 
-    /// The path that the camera went, where its reported places scatter about it.
+    /// The camera's path, if the reported poses scatter about it.
     pub fn path(&self) -> Option<&Straight> {
         self.path.as_ref()
     }
 
-    /// Hands over the same cloud's points as they are without it, and says what the sheet's thickness did.
+    /// Passes the cloud's corrected points to `take`, and returns the effect of the sheet's thickness.
     ///
     /// # Errors
     /// Those of reading the cloud, and of `take`.

@@ -1,35 +1,35 @@
-//! In: pairs of what was expected and what was seen, from comparisons of each line of a cloud with the lines before
-//! and after it. Out: how many times the expected was seen, whatever steps and edges of the part lie in some of the
+//! In: pairs of an expected and an observed value, from comparisons of each line of a cloud with the lines before
+//! and after it. Out: the ratio of observed to expected, unaffected by steps and edges of the part in some of the
 //! pairs.
 //! Frame and unit: the caller's; docs/math.md, Places that scatter (5).
 
 use crate::solve::robust_scale;
 
-/// A slope is believed from so many of its standard deviations on.
+/// A slope is significant from this many of its standard deviations on.
 const SURE: f64 = 4.0;
-/// Neighbouring comparisons share two of three shots, and those of a line their shot: the slope's standard deviation
-/// is so many times that of as many comparisons that know nothing of each other.
+/// Factor by which the slope's standard deviation exceeds that of as many independent comparisons: neighbouring
+/// comparisons share two of three shots, and those of a line share their shot.
 const SHARED: f64 = 2.0;
-/// Where the weight of a comparison has gone to nothing, in deviations: Tukey's biweight.
+/// Residual at which a comparison's weight falls to zero, in deviations: Tukey's biweight.
 const FAR: f64 = 4.7;
 const ROUNDS: usize = 20;
 
-/// Seen over expected.
+/// Ratio of observed to expected.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slope {
     pub is: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the ratio.
     pub sigma: f64,
 }
 
 impl Slope {
-    /// Whether what was expected was seen at all.
+    /// Whether the expected effect was observed at all.
     pub fn sure(&self) -> bool {
         self.is > SURE * self.sigma
     }
 }
 
-/// Of pairs (expected, seen); `None` where nothing was expected.
+/// Fits pairs (expected, observed); `None` if nothing was expected.
 pub(super) fn slope(pairs: &[[f64; 2]]) -> Option<Slope> {
     let rest = |slope: f64| move |[expected, seen]: &[f64; 2]| seen - slope * expected;
     let mut slope = middle(pairs)?;
@@ -55,7 +55,8 @@ pub(super) fn slope(pairs: &[[f64; 2]]) -> Option<Slope> {
     Some(Slope { is: slope, sigma: SHARED * left.sqrt() / square })
 }
 
-/// The slope with the least sum of absolute rests: a median of the single ones, each as heavy as it was expected to be.
+/// The slope with the least sum of absolute residuals: a median of the single slopes, each weighted by its expected
+/// value.
 fn middle(pairs: &[[f64; 2]]) -> Option<f64> {
     let mut all: Vec<(f64, f64)> =
         pairs.iter().filter(|p| p[0] != 0.0).map(|[expected, seen]| (seen / expected, expected.abs())).collect();

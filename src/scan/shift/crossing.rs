@@ -1,4 +1,4 @@
-//! In: a picture of a stripe that runs along its columns. Out: where each row crosses the stripe, between its flanks.
+//! In: a picture of a stripe that runs along its columns. Out: the stripe's column in each row, between its flanks.
 //! Frame and unit: pixels, grey levels; docs/math.md, Shift.
 
 use crate::raster::Image;
@@ -19,15 +19,15 @@ pub struct Crossing {
 
 /// Grey levels that a stripe must rise above its row's background: ten times a webcam's noise.
 const FAINTEST: f64 = 30.0;
-/// Noise of a grey level on a flank, for the sigma: photographs are compressed and speckled.
+/// Noise of a grey level on a flank, used for the sigma: photographs are compressed and speckled.
 const NOISE: f64 = 5.0;
-/// Half width of the window whose light tells the stripe from glow: a glow is wide and faint, a stripe narrow and
-/// bright, px.
+/// Half width in px of the window whose light distinguishes the stripe from glow: a glow is wide and faint, a stripe
+/// narrow and bright.
 const CORE: usize = 2;
 
-/// The stripe of each row: of the skeleton's places the one with most light in a narrow window, refined to the middle
-/// between the places where its flanks cross half of its height. On glaring metal the top is cut off
-/// by saturation and says nothing, and the width changes tenfold within a picture; the flanks hold.
+/// The stripe of each row. Of the skeleton's pixels it takes the one with most light in a narrow window. It refines
+/// the column to the middle between the positions where the flanks cross half height. On glossy metal saturation
+/// cuts off the top, and the width changes tenfold within a picture; the flanks remain usable.
 pub fn stripe_by_row(image: &Image) -> Vec<Option<Crossing>> {
     let window = ThresholdParams { size: 101, ..ThresholdParams::default() };
     let skeleton = skeleton::twin(&thin::twin(&threshold::twin(image, &window), Thinning::default()));
@@ -45,7 +45,7 @@ pub fn stripe_by_row(image: &Image) -> Vec<Option<Crossing>> {
     best.into_iter().map(|b| b.map(|(_, crossing)| crossing)).collect()
 }
 
-/// Light of the brightest narrow window, then the distance between the flanks: saturated runs are told apart by it.
+/// Light of the brightest narrow window, then the distance between the flanks, which decides between saturated runs.
 type Rank = (f64, f64);
 
 fn middle_level(row: &[f32]) -> f64 {
@@ -54,14 +54,15 @@ fn middle_level(row: &[f32]) -> f64 {
     f64::from(*sorted.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
-/// The middle between the half-height crossings about the stripe that pixel `x` belongs to.
+/// The middle between the half-height positions of the stripe that pixel `x` belongs to.
 fn flanks(row: &[f32], mut x: usize, background: f64, full: f64) -> Option<(Crossing, Rank)> {
     let at = |i: usize| f64::from(row[i]);
     let mut top = (x.saturating_sub(CORE)..(x + CORE + 1).min(row.len())).map(at).fold(0.0, f64::max);
     if at(x) < 0.5 * (background + top) {
         return None;
     }
-    // From a pixel in the glow beside it the run reaches over the stripe itself, whose own top and flanks count.
+    // From a pixel in the neighbouring glow the run reaches across the stripe itself; then the stripe's top and
+    // flanks count.
     let (a, b) = loop {
         let half = 0.5 * (background + top);
         let (mut a, mut b) = (x, x);
@@ -77,7 +78,7 @@ fn flanks(row: &[f32], mut x: usize, background: f64, full: f64) -> Option<(Cros
         }
     };
     let (amplitude, half) = (top - background, 0.5 * (background + top));
-    // A stripe that leaves the picture has one flank only.
+    // A stripe that leaves the picture has only one flank.
     if amplitude < FAINTEST || at(a) >= half || at(b) >= half {
         return None;
     }
@@ -114,7 +115,7 @@ mod tests {
             let found: Vec<f64> =
                 stripe_by_row(&Image::from_u8(300, 40, pixels)).into_iter().flatten().map(|c| c.u).collect();
             assert!(found.len() > 36, "{} rows", found.len());
-            // The glow raises the flank on its own side: by as much as it has there.
+            // The glow raises the flank on its side, in proportion to its level there.
             let allowed = 0.05 + 0.02 * glow * sigma / 4.0;
             assert!(found.iter().all(|u| (u - 120.4).abs() < allowed), "{sigma} {glow} {reflection}: {found:?}");
         }

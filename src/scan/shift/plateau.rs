@@ -1,4 +1,4 @@
-//! In: points of a scan by the stripe's shift. Out: the level surface that stands on the bed, if one does.
+//! In: points of a scan by the stripe's shift. Out: the level surface that stands on the bed, if there is one.
 //! Frame and unit: heights above the bed, mm; docs/math.md, Shift.
 
 use crate::scan::CloudPoint;
@@ -11,29 +11,31 @@ pub struct Plateau {
     pub height_mm: f64,
     /// Their robust standard deviation (1.4826 MAD), mm.
     pub noise_mm: f64,
-    /// Standard deviation of the medians of single pictures, mm: what travels with the picture and does not average.
+    /// Standard deviation of the medians of single pictures, mm: the error that a picture's points share and that
+    /// does not average out.
     pub between_shots_mm: f64,
-    /// How many lie within 0.5 mm of the most frequent height.
+    /// Number of points within 0.5 mm of the most frequent height.
     pub points: usize,
     /// Pictures with ten or more of these points.
     pub shots: usize,
 }
 
-/// Points this near to the most frequent height are on the surface, mm.
+/// Points within this distance of the most frequent height belong to the surface, mm.
 const NEAR: f64 = 0.5;
-/// What is scattered evenly over both sides of NEAR has a robust deviation of 0.37 mm: that is no surface.
+/// Largest robust deviation of a surface, mm. Points scattered evenly within ± NEAR have 0.37 mm and form no
+/// surface.
 const LEVEL: f64 = 0.25;
-/// A point belongs to a surface where most of the rows this near have one at its height ...
+/// A point belongs to a surface if most of the rows within this distance have a point at its height ...
 const ROWS: i64 = 4;
 const HEIGHT: f64 = 0.4;
-/// ... and so many pictures, and points in all, show it.
+/// ... and if at least this many pictures and points show the surface.
 const SHOTS: usize = 3;
 const POINTS: usize = 100;
-/// Points that give a picture's own median.
+/// Least number of points for a picture's own median.
 const OF_SHOT: usize = 10;
 const BIN: f64 = 0.1;
 
-/// The level surface in points above the bed; `None` where what is there does not hang together.
+/// The level surface in points above the bed; `None` if the points do not form one.
 pub fn plateau(raised: &[CloudPoint]) -> Option<Plateau> {
     let together = connected(raised);
     let z = |p: &CloudPoint| f64::from(p.position[2]);
@@ -95,7 +97,7 @@ mod tests {
             .map(|(s, r)| point(s, r, rng.random_range(1.0..3.0)))
             .collect();
         assert_eq!(plateau(&scatter), None);
-        // In every row: neighbours are there, but not at the same height.
+        // In every row: neighbours exist, but not at the same height.
         let dense: Vec<CloudPoint> = (0..40)
             .flat_map(|s| (0..300).map(move |r| (s, r)))
             .map(|(s, r)| point(s, r, rng.random_range(1.0..3.0)))
@@ -109,7 +111,7 @@ mod tests {
         );
         let found = plateau(&part).unwrap();
         assert!((found.height_mm - 3.7).abs() < 0.02 && found.shots == 5, "{found:?}");
-        // Two pictures are a reflection, not a part that travelled.
+        // Two pictures are a reflection, not a part that travelled through the light.
         let brief: Vec<CloudPoint> = (0..2).flat_map(|s| (0..200).map(move |r| point(s, r, 2.0))).collect();
         assert_eq!(plateau(&brief), None);
     }

@@ -40,22 +40,22 @@ fn unknown(word: &str) -> String {
 pub struct ShiftRig {
     /// Pixels per mm on the bed, 0.1..=1000.
     pub pixels_per_mm: f64,
-    /// Camera above the bed, mm, 1..=10000.
+    /// Height of the camera above the bed, mm, 1..=10000.
     pub camera_height_mm: f64,
-    /// Laser beside the camera, mm, 1..=10000.
+    /// Distance of the laser from the camera, mm, 1..=10000.
     pub baseline_mm: f64,
     /// To which side of the picture a raised surface moves the stripe.
     pub raises: Side,
     /// Travel of the bed from picture to picture, mm, 0.001..=100.
     pub travel_mm: f64,
-    /// Rows that always show the bare bed: they give the zero of each picture.
+    /// Rows that always show the bare bed; they define zero height in each picture.
     pub bed_rows: Vec<[u32; 2]>,
-    /// Which part of a colour picture is taken as grey.
+    /// Which part of a colour picture is used as grey.
     pub channel: Channel,
 }
 
 impl ShiftRig {
-    /// Refuses numbers outside their ranges, and bed rows that name no rows.
+    /// Refuses numbers outside their ranges, and bed rows that select no row.
     pub fn check(&self) -> Result<()> {
         for (name, value, low, high) in [
             ("pixels per mm", self.pixels_per_mm, 0.1, 1000.0),
@@ -75,7 +75,7 @@ impl ShiftRig {
         Ok(())
     }
 
-    /// True of a row that always shows the bare bed.
+    /// Whether a row always shows the bare bed.
     fn is_bed(&self, row: f64) -> bool {
         self.bed_rows.iter().any(|[a, b]| (f64::from(*a)..=f64::from(*b)).contains(&row))
     }
@@ -87,16 +87,16 @@ impl ShiftRig {
     }
 }
 
-/// Where the stripe would lie on the bed: a line through the bed rows, and how far the stripe of the empty bed lies
-/// beside such a line.
+/// The stripe's position on the bed: a line through the bed rows, and the deviation of the empty bed's stripe from
+/// such a line.
 #[derive(Clone, Debug, Default)]
 struct Zero {
     beside: Vec<f64>,
 }
 
 impl Zero {
-    /// From pictures of the empty bed, which show how the lens and the laser bend the stripe: the median of each row.
-    /// A row that fewer than half of them show lies as its neighbours do.
+    /// Computed from pictures of the empty bed, which show how the lens and the laser bend the stripe: the median of
+    /// each row. A row that fewer than half of them show is interpolated from its neighbours.
     fn of(pictures: &[Vec<Option<Crossing>>], rig: &ShiftRig) -> Option<Zero> {
         let lines: Vec<_> = pictures.iter().filter_map(|p| Some((p, bed_line(p, rig)?))).collect();
         let rows = lines.first()?.0.len();
@@ -121,13 +121,13 @@ impl Zero {
     }
 }
 
-/// The line of the bed rows; `None` where they do not show the bed.
+/// The line of the bed rows; `None` if they do not show the bed.
 fn bed_line(rows: &[Option<Crossing>], rig: &ShiftRig) -> Option<(f64, f64)> {
     let on_bed = |(v, k): (usize, &Option<Crossing>)| k.filter(|_| rig.is_bed(v as f64)).map(|k| (v as f64, k.u));
     robust_line(&rows.iter().enumerate().filter_map(on_bed).collect::<Vec<_>>())
 }
 
-/// Points of one picture; empty where the bed rows do not show the bed.
+/// Points of one picture; empty if the bed rows do not show the bed.
 fn points(rows: &[Option<Crossing>], shot: u32, rig: &ShiftRig, zero: &Zero) -> Vec<CloudPoint> {
     let found = || rows.iter().enumerate().filter_map(|(v, k)| k.map(|k| (v, k)));
     let Some((u0, slope)) = bed_line(rows, rig) else { return Vec::new() };
@@ -149,8 +149,8 @@ fn points(rows: &[Option<Crossing>], shot: u32, rig: &ShiftRig, zero: &Zero) -> 
     found().map(point).filter(|p| p.position[2].is_finite()).collect()
 }
 
-/// u = a + b v by the median of slopes and of offsets (Theil 1950; docs/math.md, Shift); half of the points may be
-/// wrong.
+/// u = a + b v by the median of slopes and of offsets (Theil 1950; docs/math.md, Shift); up to half of the points
+/// may be outliers.
 fn robust_line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     if points.len() < 10 {
         return None;
@@ -165,22 +165,22 @@ fn robust_line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     Some((median(points.iter().map(|(v, u)| u - slope * v).collect()), slope))
 }
 
-/// What a shift scan came to.
+/// Result of a shift scan.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct ShiftReport {
-    /// The rig as it was given.
+    /// The rig, unchanged from the input.
     pub rig: ShiftRig,
-    /// Pictures of the scan, those of the empty bed not counted.
+    /// Pictures of the scan, not counting those of the empty bed.
     pub pictures: usize,
-    /// Points of the cloud, those on the bed included.
+    /// Points of the cloud, including those on the bed.
     pub points: usize,
     /// Pictures whose bed rows did not show the bed.
     pub without_bed: Vec<String>,
     /// Pictures of the empty bed that gave the zero of each row; 0 without a reference.
     pub reference: usize,
-    /// The bed itself: noise of the zero.
+    /// Noise of the zero height on the bed itself, mm.
     pub bed_noise_mm: f64,
-    /// The level surface above the bed; `None` where what is there does not hang together.
+    /// The level surface above the bed; `None` if the points do not form one.
     pub plateau: Option<Plateau>,
 }
 
@@ -305,14 +305,14 @@ mod tests {
         }
     }
 
-    /// A bent stripe: without a reference the bend is height.
+    /// A bent stripe: without a reference its bend appears as height.
     #[test]
     fn a_reference_takes_out_how_the_stripe_is_bent() {
         let bent = |shift: f64| -> Vec<Option<Crossing>> {
             let at = |v: usize| {
                 let bend = 3.0 * ((v as f64 - 150.0) / 150.0).powi(2);
                 let u = 260.0 + bend - if (100..200).contains(&v) { shift } else { 0.0 };
-                // Some rows are never seen.
+                // Some rows are never visible.
                 (v % 10 != 3).then_some(Crossing { u, sigma_px: 0.1, amplitude: 100.0, saturated: false })
             };
             (0..300).map(at).collect()

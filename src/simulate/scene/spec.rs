@@ -1,4 +1,4 @@
-//! In: a scene file (TOML) of blocks, cylinders, balls and parts. Out: what it says.
+//! In: a scene file (TOML) of blocks, cylinders, balls and parts. Out: its content, checked.
 //! Frame and unit: scene frame, z up, mm; the file's keys are in docs/file-formats.md, Scene file.
 
 use crate::fault::{Fault, Result};
@@ -6,40 +6,40 @@ use crate::geometry::{Mat3, Vec3};
 use crate::simulate::solid::Shape;
 use std::path::Path;
 
-/// Largest coordinate, mm, and turn, degrees.
+/// Largest coordinate, mm, and largest rotation, degrees.
 pub(super) const FARTHEST: f64 = 1e5;
 
 /// Content of a scene file.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
-    /// Shown in reports and written to truth.json.
+    /// Name in reports and in truth.json.
     pub name: String,
-    /// What the scan covers: x0, y0, x1, y1, mm.
+    /// Region that the scan covers: x0, y0, x1, y1, mm.
     pub region_mm: [f64; 4],
-    /// Height that the sheet meets on the optical axis, mm: the middle of the part's heights.
+    /// Height at which the sheet meets the optical axis, mm: the middle of the part's heights.
     #[serde(default)]
     pub focus_height_mm: f64,
-    /// Solids in the scene's own frame.
+    /// Solids in the scene's frame.
     #[serde(default)]
     pub solid: Vec<SolidSpec>,
-    /// Groups of solids, each in a frame of its own.
+    /// Groups of solids, each with a separate frame.
     #[serde(default)]
     pub part: Vec<PartSpec>,
 }
 
-/// Solids that belong together, in a frame of their own that truth.json reports.
+/// Solids that belong together, in a common frame whose pose truth.json reports.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PartSpec {
-    /// As truth.json reports it.
+    /// Name in truth.json.
     pub name: String,
     /// The part's origin in the scene, mm.
     pub at_mm: [f64; 3],
-    /// Turn about z, degrees.
+    /// Rotation about z, degrees.
     #[serde(default)]
     pub turn_deg: f64,
-    /// Then tilts about the scene's x and y, degrees.
+    /// Subsequent tilts about the scene's x and y, degrees.
     #[serde(default)]
     pub tilt_deg: [f64; 2],
     /// Solids in the part's frame.
@@ -51,14 +51,14 @@ pub struct PartSpec {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolidSpec {
-    /// Its outer shape.
+    /// Outer shape.
     pub shape: ShapeSpec,
-    /// Middle of the top face in the scene, or in the part that it belongs to, mm.
+    /// Middle of the top face in the scene, or in the part that the solid belongs to, mm.
     pub at_mm: [f64; 3],
-    /// Turn about z, degrees.
+    /// Rotation about z, degrees.
     #[serde(default)]
     pub turn_deg: f64,
-    /// Of all its faces, cut-outs included.
+    /// Material of all its faces, including those of cut-outs.
     #[serde(default)]
     pub material: Material,
     /// Holes and pockets; none unless stated.
@@ -76,12 +76,12 @@ pub struct SolidSpec {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CutSpec {
-    /// Shape of what is taken away.
+    /// Shape of the removed volume.
     pub shape: ShapeSpec,
-    /// Middle of the opening, origin in the middle of the solid's top face, mm; that middle unless stated.
+    /// Middle of the opening, mm; origin and default are the middle of the solid's top face.
     #[serde(default)]
     pub at_mm: [f64; 3],
-    /// Turn about z, degrees.
+    /// Rotation about z, degrees.
     #[serde(default)]
     pub turn_deg: f64,
     /// Copies [along x, along y]; one unless stated.
@@ -96,7 +96,7 @@ fn one() -> [u32; 2] {
     [1, 1]
 }
 
-/// A shape; sizes are 0.001..=100000 mm, and it lies below its top face at z = 0.
+/// A shape. Sizes are 0.001..=100000 mm, and the shape lies below its top face at z = 0.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ShapeSpec {
@@ -109,39 +109,39 @@ pub enum ShapeSpec {
     Wedge {
         /// Size along x, y, z, mm; z at the high side.
         size_mm: [f64; 3],
-        /// How far the top falls, mm; less than the size along z.
+        /// Fall of the top, mm; less than the size along z.
         drop_mm: f64,
     },
     /// An upright cylinder.
     Cylinder {
-        /// Across, mm.
+        /// Diameter, mm.
         diameter_mm: f64,
-        /// From top to bottom, mm.
+        /// Height from top to bottom, mm.
         depth_mm: f64,
     },
-    /// A frustum: a funnel as a cut-out.
+    /// A frustum; as a cut-out it is a funnel.
     Cone {
         /// Diameter of the top, mm.
         top_mm: f64,
         /// Diameter of the bottom, mm.
         bottom_mm: f64,
-        /// From top to bottom, mm.
+        /// Height from top to bottom, mm.
         depth_mm: f64,
     },
     /// A ball that touches z = 0 from below.
     Ball {
-        /// Across, mm.
+        /// Diameter, mm.
         diameter_mm: f64,
     },
 }
 
-/// How a surface throws light back.
+/// How a surface reflects light.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Material {
-    /// Diffuse share, 0..=1.
+    /// Diffuse reflectance, 0..=1.
     pub albedo: f64,
-    /// Share thrown back as by a mirror, 0..=1; gives false stripes on what stands beside it.
+    /// Share reflected as by a mirror, 0..=1; it causes false stripes on neighbouring surfaces.
     pub mirror: f64,
     /// Strength of the gloss seen by the camera, 0..=20, relative to a white matte surface ...
     pub gloss: f64,

@@ -1,5 +1,5 @@
-//! In: a scene file's content, or a board. Out: what rays hit and with which material, and how far a measured point
-//! is from the nearest surface.
+//! In: a scene file's content, or a board. Out: the surfaces and materials that rays hit, and the distance of a
+//! measured point from the nearest surface.
 //! Frame and unit: scene frame, z up, mm.
 
 use super::spec::{FARTHEST, Material, PartSpec, SceneSpec, SolidSpec};
@@ -9,17 +9,17 @@ use crate::recording::BoardSpec;
 use crate::simulate::pattern::Pattern;
 use crate::simulate::solid::{Body, Cut, Shape};
 
-/// Most copies of one solid, or cuts in it; most of both in a scene.
+/// Most copies of one solid, and most cuts in it.
 const MOST_COPIES: u64 = 10_000;
 const MOST_BODIES: u64 = 100_000;
 
-/// Places of the copies, centred on the origin.
+/// Positions of the copies, centred on the origin.
 fn copies(repeat: [u32; 2], pitch: [f64; 2]) -> impl Iterator<Item = Vec3> {
     let offset = move |i: u32, axis: usize| (f64::from(i) - f64::from(repeat[axis] - 1) / 2.0) * pitch[axis];
     (0..repeat[1]).flat_map(move |j| (0..repeat[0]).map(move |i| Vec3::new(offset(i, 0), offset(j, 1), 0.0)))
 }
 
-/// A body at its place, with a ball around it that most rays miss.
+/// A body at its pose, with a bounding ball that most rays miss.
 #[derive(Clone, Debug)]
 struct Placed {
     body: Body,
@@ -29,9 +29,9 @@ struct Placed {
     centre: Vec3,
     radius: f64,
     material: Material,
-    /// A printed pattern on the top face; board frame = x right, y down, z into the board.
+    /// A printed pattern on the top face; in the board frame x is right, y down, z into the board.
     print: Option<Print>,
-    /// Index into `Scene::bodies`' owners: whether it belongs to a part.
+    /// Index of the part that the body belongs to, if any.
     part: Option<usize>,
 }
 
@@ -43,29 +43,29 @@ struct Print {
     black: f64,
 }
 
-/// Surface that a ray met.
+/// The surface point that a ray met.
 #[derive(Clone, Copy, Debug)]
 pub struct Hit {
-    /// Along the ray, mm.
+    /// Distance along the ray, mm.
     pub t: f64,
-    /// Where, scene frame, mm.
+    /// Position in the scene frame, mm.
     pub point: Vec3,
-    /// Outward, of unit length.
+    /// Outward unit normal.
     pub normal: Vec3,
-    /// Of the surface there, its print included.
+    /// Material of the surface there, including its print.
     pub material: Material,
 }
 
 /// A scene ready for rays.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// What it was made of.
+    /// The content that it was made from.
     pub spec: SceneSpec,
     bodies: Vec<Placed>,
 }
 
 impl Scene {
-    /// Refuses senseless sizes and materials, too many solids, and a scene that holds nothing.
+    /// Refuses invalid sizes and materials, too many solids, and an empty scene.
     pub fn new(spec: SceneSpec) -> Result<Scene> {
         let mut bodies = Vec::new();
         let world = (Mat3::identity(), Vec3::zeros());
@@ -83,11 +83,11 @@ impl Scene {
         Ok(Scene { spec, bodies })
     }
 
-    /// A calibration board alone, in the board's own frame turned so that the scene's z comes out
-    /// of the board: scene x = board x, scene y = -board y, scene z = -board z.
+    /// A calibration board alone. The board's frame is turned so that the scene's z points out of the board: scene x
+    /// = board x, scene y = -board y, scene z = -board z.
     ///
     /// # Errors
-    /// A ChArUco board whose markers its dictionary does not have.
+    /// A ChArUco board that needs markers which its dictionary does not contain.
     pub fn of_board(board: &BoardSpec, white: f64, black: f64) -> Result<Scene> {
         let [x0, y0, x1, y1] = board.outline();
         let spec = SceneSpec {
@@ -128,7 +128,7 @@ impl Scene {
         })
     }
 
-    /// True when nothing stands between two points (their own surfaces excepted).
+    /// Whether nothing stands between two points; the surfaces that the points lie on do not count.
     pub fn clear(&self, from: &Vec3, to: &Vec3) -> bool {
         let way = to - from;
         let length = way.norm();
@@ -147,7 +147,7 @@ impl Scene {
         self.bodies.iter().map(|b| b.body.distance(&b.to_body(p))).fold(f64::INFINITY, f64::min)
     }
 
-    /// The same with a calibration board that lies in it: `rotation` and `at` take the board's coordinates to the
+    /// The same scene with a calibration board added: `rotation` and `at` transform the board's coordinates to the
     /// scene's.
     ///
     /// # Errors
@@ -160,7 +160,7 @@ impl Scene {
         white: f64,
         black: f64,
     ) -> Result<Scene> {
-        // The board's own scene has its z out of the board.
+        // In the board's own scene z points out of the board.
         let out_of_board = Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0));
         for mut placed in Scene::of_board(board, white, black)?.bodies {
             placed.rotation = rotation * out_of_board * placed.rotation;
@@ -172,7 +172,7 @@ impl Scene {
         Ok(self)
     }
 
-    /// The part that a scene-frame point is nearest to, when it is nearer than to anything else.
+    /// The part that is nearest to a scene-frame point; `None` if something else is nearer.
     pub fn part_near(&self, p: &Vec3) -> Option<usize> {
         let key = |b: &&Placed| b.body.distance(&b.to_body(p)).abs();
         self.bodies.iter().min_by(|a, b| key(a).total_cmp(&key(b))).and_then(|b| b.part)
@@ -194,7 +194,7 @@ fn place(out: &mut Vec<Placed>, solid: &SolidSpec, frame: &(Mat3, Vec3), part: O
                 .next("correct repeat; leave it out for a single one"));
         }
     }
-    // What is there already counts too: rays are tried on everything.
+    // Bodies that are there already count too, because every ray is tested against all bodies.
     let held =
         out.iter().map(|b| 1 + b.body.cuts.len() as u64).sum::<u64>() + of(solid.repeat).saturating_mul(1 + cuts);
     if held > MOST_BODIES {
@@ -255,7 +255,7 @@ impl Placed {
     }
 }
 
-/// A part's place with the scene taken as the base: multiply by base_from_scene for the truth.
+/// A part's pose with the scene as base frame; multiplied by base_from_scene it is the true pose.
 pub fn part_pose<S: crate::geometry::Frame>(part: &PartSpec) -> Rigid<S, Part> {
     let (r, t) = part.scene_from_part();
     Rigid::new(r, t)
@@ -287,7 +287,7 @@ mod tests {
     #[test]
     fn repeated_holes_are_where_the_file_puts_them() {
         let scene = Scene::new(SceneSpec::parse(TEXT).unwrap()).unwrap();
-        // Part (2.54, 3.81) turned by 90 degrees is (-3.81, 2.54) about the part's origin.
+        // Part position (2.54, 3.81) turned by 90 degrees is (-3.81, 2.54) about the part's origin.
         let hit = scene.hit(&Vec3::new(3.0 - 3.81, 4.0 + 2.54, 50.0), &-Vec3::z(), 1e9).unwrap();
         assert!((hit.point.z - 3.0).abs() < 1e-12);
         assert_eq!(scene.part_near(&hit.point), Some(0));

@@ -1,4 +1,4 @@
-//! In: a GigE Vision camera. Out: its pictures, incomplete ones told; its features; its clock.
+//! In: a GigE Vision camera. Out: its pictures, reports of incomplete ones; its features; its clock.
 //! Frame and unit: the camera's clock in ns.
 
 use super::find::find;
@@ -15,9 +15,9 @@ use viva_genicam::genapi::FeatureValue;
 use viva_genicam::gige::DeviceInfo;
 use viva_genicam::{Camera, ControlState, FrameStream, GenicamError, GigeRegisterIo, StreamOptions, blocking};
 
-/// Nothing came for this long: it is asked whether the camera is still there.
+/// After this time without data the camera is queried whether it is still there.
 const SILENCE: Duration = Duration::from_secs(1);
-/// Packets that fit every network that was not set up for more, bytes.
+/// Packet size that fits every network without special setup, bytes.
 const USUAL_PACKET: u32 = 1500;
 const LATCH: [&str; 3] = ["GevTimestampControlLatch", "TimestampControlLatch", "TimestampLatch"];
 const CLOCK: [&str; 3] = ["GevTimestampValue", "TimestampValue", "TimestampLatchValue"];
@@ -30,7 +30,7 @@ const FORMER: [(&str, &str); 5] = [
     ("TriggerDelay", "TriggerDelayAbs"),
     ("AcquisitionFrameRateEnable", "AcquisitionFrameRateEnabled"),
 ];
-/// Set again, in this order, where a camera comes back without.
+/// Features that are restored, in this order, when a camera comes back with its defaults.
 const SETTINGS: [&str; 21] = [
     "PixelFormat",
     "BinningHorizontal",
@@ -59,7 +59,7 @@ const CHUNKS: [&str; 4] = ["ChunkCounterValue", "ChunkEncoderValue", "ChunkLineS
 /// A camera on the network.
 pub struct GigeCamera {
     word: String,
-    /// Its serial number, or its address where it has none.
+    /// Its serial number, or its address if it has none.
     serial: String,
     packet: Option<u32>,
     camera: Camera<GigeRegisterIo>,
@@ -68,20 +68,20 @@ pub struct GigeCamera {
     readout: Option<Readout>,
     pixel_format: String,
     exposure_ns: Option<u64>,
-    /// ns a tick of its clock.
+    /// ns per tick of its clock.
     tick_ns: f64,
     latch: Option<(&'static str, &'static str)>,
     chunk: Option<&'static str>,
     resent: u64,
     heard: Instant,
     numbers: Numbers,
-    /// What it was set to when it began to send: one that lost its power comes back without.
+    /// Its settings when it began to send. A camera that lost its power comes back without them.
     kept: Vec<(&'static str, String)>,
 }
 
 fn said(what: &str, e: &GenicamError) -> Fault {
     let text = e.to_string();
-    // Some cameras answer the second program that asks for control, some are silent.
+    // Some cameras answer a second program that asks for control with an error, others do not answer.
     let denied = text.to_uppercase().contains("ACCESS_DENIED") || text.contains("claim control");
     let what = format!("{what}: {text}");
     if denied {
@@ -99,15 +99,15 @@ fn serial(device: &DeviceInfo) -> String {
 }
 
 impl GigeCamera {
-    /// Takes control of the camera; it sends nothing yet. `packet`: bytes of a packet; none: as large as the network
-    /// carries.
+    /// Takes control of the camera; it sends nothing yet. `packet` is the packet size in bytes; none: as large as
+    /// the network carries.
     ///
     /// # Errors
-    /// No such camera, or one that is in use, or whose pixels are not grey.
+    /// No such camera, a camera that is in use, or one whose pixels are not grey.
     pub fn open(word: &str, packet: Option<u32>) -> Result<GigeCamera> {
         let device = find(word)?;
         let camera = blocking::connect(&device).map_err(|e| said(&format!("gige://{word}"), &e))?;
-        // A packet of a loopback's size never comes through whole.
+        // Packets as large as a loopback interface allows never arrive complete.
         let packet = packet.or(device.ip.is_loopback().then_some(USUAL_PACKET));
         let mut camera = GigeCamera {
             word: word.into(),
@@ -131,7 +131,7 @@ impl GigeCamera {
         Ok(camera)
     }
 
-    /// Reads what pictures will be like.
+    /// Reads the format of its pictures.
     fn look(&mut self) -> Result<()> {
         let at = format!("gige://{}", self.word);
         let read = |name: &str| self.camera.get_integer(name).map_err(|e| said(&format!("{at}: {name}"), &e));
@@ -154,7 +154,7 @@ impl GigeCamera {
         Ok(())
     }
 
-    /// Has the camera send.
+    /// Makes the camera send.
     fn start(&mut self) -> Result<()> {
         let at = format!("gige://{}", self.word);
         if self.kept.is_empty() {
@@ -178,7 +178,7 @@ impl GigeCamera {
         if self.tick_ns == 1.0 { ticks } else { (ticks as f64 * self.tick_ns) as u64 }
     }
 
-    /// The encoder's or a counter's value that the picture brought along.
+    /// The encoder's or a counter's value that came with the picture.
     fn chunk_count(&mut self, frame: &viva_genicam::Frame) -> Option<i64> {
         let name = self.chunk?;
         frame.chunks.as_ref()?;
@@ -198,7 +198,7 @@ impl GigeCamera {
         let device_ns = frame.ts_dev.map(|t| self.ns(t));
         let format = frame.pixel_format.name().unwrap_or(&self.pixel_format).to_owned();
         let viva_genicam::Frame { payload, raw_payload, width, height, padding_x, .. } = frame;
-        // Of the two that share the bytes one goes, so that the other can be had without a copy.
+        // The two share the bytes: dropping one lets the other be converted without a copy.
         drop(raw_payload);
         let image = unpack(&format, width, height, usize::from(padding_x), payload.into());
         match image {
@@ -280,7 +280,7 @@ impl PictureSource for GigeCamera {
     }
 
     fn features(&mut self) -> Result<Vec<Feature>> {
-        // What stands in a category is for people; the rest is how the camera's file reckons.
+        // Features in a category are meant for users; the others are internals of the camera's description file.
         let listed = self.camera.nodemap().categories().into_iter().flat_map(|(_, names)| names.to_vec());
         let mut names: Vec<String> = listed.collect();
         names.sort();
@@ -330,7 +330,7 @@ impl PictureSource for GigeCamera {
 }
 
 impl GigeCamera {
-    /// What comes next from the network.
+    /// The next event from the network.
     fn receive(&mut self, within: Duration) -> Event {
         if self.stream.is_none()
             && let Err(fault) = self.start()
@@ -348,7 +348,7 @@ impl GigeCamera {
                     return Event::Quiet;
                 }
                 self.heard = Instant::now();
-                // A camera that waits for a trigger is silent and answers.
+                // A camera that waits for a trigger sends nothing but answers queries.
                 let there = self.camera.transport().control_state() == ControlState::Held;
                 self.camera.invalidate("Width");
                 match self.camera.get_integer("Width") {
@@ -361,7 +361,7 @@ impl GigeCamera {
         }
     }
 
-    /// What it is set to, of all that pictures depend on.
+    /// Current values of all settings that affect pictures.
     fn settings(&mut self) -> Vec<(&'static str, String)> {
         let kept = |name: &&'static str| {
             let own = self.own_name(name);
@@ -371,15 +371,14 @@ impl GigeCamera {
         SETTINGS.iter().filter_map(kept).collect()
     }
 
-    /// What this camera calls a standard feature: cameras from before the standard's second version have names of
-    /// their own.
+    /// This camera's name for a standard feature: cameras from before the standard's second version use other names.
     fn own_name<'a>(&self, name: &'a str) -> &'a str {
         let has = |n: &&str| self.camera.nodemap().node(n).is_some();
         let former = FORMER.iter().filter(|(now, _)| *now == name).map(|(_, then)| *then);
         std::iter::once(name).chain(former).find(has).unwrap_or(name)
     }
 
-    /// A feature as it is now; none for what a person cannot set or read.
+    /// A feature with its present value; none if the user can neither set nor read it.
     fn feature(&mut self, name: &str) -> Option<Feature> {
         let state = self.camera.feature_state(name).ok()?;
         if !state.is_implemented || !state.is_available || state.access.is_none() {

@@ -1,4 +1,4 @@
-//! In: nothing, or a word. Out: the GigE Vision cameras that answer, or the one that is meant.
+//! In: nothing, or a word. Out: the GigE Vision cameras that answer, or the one that the word names.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
@@ -7,23 +7,23 @@ use std::time::Duration;
 use viva_genicam::blocking;
 use viva_genicam::gige::{DeviceInfo, DiscoveryOptions};
 
-/// How long is waited for answers.
+/// Time to wait for answers.
 const PATIENCE: Duration = Duration::from_millis(600);
 
 /// A camera that answered.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Found {
-    /// Its address now.
+    /// Its present address.
     pub ip: String,
-    /// Empty where it does not say.
+    /// Empty if not stated.
     pub manufacturer: String,
-    /// Empty where it does not say.
+    /// Empty if not stated.
     pub model: String,
-    /// Empty where it does not say.
+    /// Empty if not stated.
     pub serial: String,
-    /// The name that a person gave it.
+    /// The name that the user gave it.
     pub name: String,
-    /// The address of this machine at which it answered.
+    /// The address of this machine's interface on which it answered.
     pub interface: String,
 }
 
@@ -50,15 +50,15 @@ fn devices() -> Result<Vec<DeviceInfo>> {
     })
 }
 
-/// All cameras that answer on any interface, this machine's own included.
+/// All cameras that answer on any interface, including this machine's loopback.
 ///
 /// # Errors
-/// No interface can be asked.
+/// No interface can be queried.
 pub fn found() -> Result<Vec<Found>> {
     Ok(devices()?.iter().map(Found::of).collect())
 }
 
-/// The camera of that address, serial number or name; `first`: the only one that answers.
+/// The camera of that address, serial number or name; `first` means the only one that answers.
 ///
 /// # Errors
 /// None answers, or several do.
@@ -95,7 +95,7 @@ pub fn find(word: &str) -> Result<DeviceInfo> {
     }
 }
 
-/// The interfaces that are asked, as far as the system tells.
+/// Names of the interfaces that are queried, as far as the system lists them.
 pub fn interfaces() -> String {
     let names = std::fs::read_dir("/sys/class/net")
         .map_or(Vec::new(), |all| all.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect());

@@ -1,5 +1,5 @@
-//! In: a GigE Vision camera's serial number, address or name. Out: its pictures as a source, its features, what
-//! cameras there are.
+//! In: a GigE Vision camera's serial number, address or name. Out: its pictures as a source, its features; a list of
+//! the cameras found.
 //! Frame and unit: the camera's clock in ns; features by the standard names (SFNC).
 
 mod camera;

@@ -4,20 +4,20 @@
 use crate::fault::{Fault, Result};
 use crate::raster::Image;
 
-/// How levels lie in the bytes.
+/// Layout of the levels in the bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Layout {
-    /// A byte a level.
+    /// One byte per level.
     Byte,
-    /// Two bytes a level, little endian.
+    /// Two bytes per level, little endian.
     Word,
-    /// Bits one after another, the lowest first, rows without gaps (PFNC's `p`).
+    /// Levels as consecutive bits, the lowest first, rows without gaps (PFNC's `p`).
     Dense,
     /// Two levels in three bytes: high bits, low bits of both, high bits (GigE Vision's `Packed`).
     Packed,
 }
 
-/// Depth and layout of a grey format; none for any other.
+/// Depth and layout of a grey format; none for any other format.
 fn layout(format: &str) -> Option<(u8, Layout)> {
     Some(match format {
         "Mono8" => (8, Layout::Byte),
@@ -34,10 +34,10 @@ fn layout(format: &str) -> Option<(u8, Layout)> {
     })
 }
 
-/// Bits of a grey format.
+/// Bits per level of a grey format.
 ///
 /// # Errors
-/// A format that is not grey, or that is not known.
+/// A format that is not grey or not known.
 pub fn depth(format: &str) -> Result<u8> {
     layout(format).map(|(bits, _)| bits).ok_or_else(|| {
         Fault::input(format!("the camera's pixel format is {format}"))
@@ -49,10 +49,11 @@ pub fn depth(format: &str) -> Result<u8> {
     })
 }
 
-/// The picture; a byte a level without padding is taken over as it is. `padding`: bytes after each row.
+/// Converts the bytes to a picture. With one byte per level and no padding they are used without a copy. `padding`
+/// is the number of bytes after each row.
 ///
 /// # Errors
-/// A format that is not grey; fewer bytes than it has; a level above its depth.
+/// A format that is not grey; too few bytes; a level above the depth.
 pub fn unpack(format: &str, width: u32, height: u32, padding: usize, mut bytes: Vec<u8>) -> Result<Image> {
     let bits = depth(format)?;
     let (_, layout) = layout(format).expect("it has a depth");
@@ -63,7 +64,7 @@ pub fn unpack(format: &str, width: u32, height: u32, padding: usize, mut bytes: 
         Layout::Dense => (w * usize::from(bits)).div_ceil(8),
         Layout::Packed => (w * 3).div_ceil(2),
     };
-    // Levels go on from row to row where nothing lies between.
+    // Without padding, packed levels continue from row to row.
     let dense = matches!(layout, Layout::Dense | Layout::Packed) && padding == 0;
     let whole = match layout {
         Layout::Dense if dense => (w * h * usize::from(bits)).div_ceil(8),

@@ -3,7 +3,7 @@
 use crate::camera::Readout;
 use viva_genicam::{Camera, GigeRegisterIo};
 
-/// Region, binning and decimation; none where the camera does not say all that it has of them.
+/// Region, binning and decimation; none if the camera does not report all that it supports of them.
 pub fn of(camera: &Camera<GigeRegisterIo>) -> Option<Readout> {
     let has = |name: &str| camera.nodemap().node(name).is_some();
     let number = |name: &str, without: u32| {
@@ -14,7 +14,7 @@ pub fn of(camera: &Camera<GigeRegisterIo>) -> Option<Readout> {
     let [mut binning, mut decimation] =
         [pair("BinningHorizontal", "BinningVertical", 1)?, pair("DecimationHorizontal", "DecimationVertical", 1)?];
     for (i, mode) in ["DecimationHorizontalMode", "DecimationVerticalMode"].into_iter().enumerate() {
-        // Pixels that are averaged lie in their middle, as binned ones.
+        // A pixel averaged from several lies at their middle, like a binned one.
         if has(mode) && camera.get_enum(mode).ok()? == "Average" {
             (binning[i], decimation[i]) = (binning[i] * decimation[i], 1);
         }
@@ -30,11 +30,11 @@ pub fn of(camera: &Camera<GigeRegisterIo>) -> Option<Readout> {
     if step.contains(&0) {
         return None;
     }
-    // The largest picture there could be with this binning and decimation.
+    // The largest possible picture with this binning and decimation.
     let most = if has("WidthMax") && has("HeightMax") { Some(pair("WidthMax", "HeightMax", 0)?) } else { None };
     let most = most.map(|m| [m[0].saturating_mul(step[0]), m[1].saturating_mul(step[1])]);
     let sensor = if has("SensorWidth") && has("SensorHeight") { pair("SensorWidth", "SensorHeight", 0) } else { None };
-    // A mode of the maker's own, which is none of these, makes the picture smaller too.
+    // The picture can also be smaller because of a manufacturer's mode that is none of these.
     let explained = most.zip(sensor).is_none_or(|(m, s)| (0..2).all(|i| f64::from(m[i]) > 0.9 * f64::from(s[i])));
     let sensor_px = most.or(sensor);
     let says = ["OffsetX", "BinningHorizontal", "DecimationHorizontal", "WidthMax"].into_iter().any(has);

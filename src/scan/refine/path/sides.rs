@@ -1,13 +1,13 @@
-//! In: places of one shot's line, each with its distance from its neighbours' surface. Out: one such place for each
-//! half of the line, the usual one, whatever steps and edges lie under the rest.
+//! In: points of one shot's line, each with its distance from its neighbours' surface. Out: one representative point
+//! for each half of the line, unaffected by steps and edges under the rest.
 //! Frame and unit: the cloud's frame, mm.
 
 use crate::geometry::Vec3;
 use crate::solve::robust_scale;
 
-/// Fewer places tell too little of a half.
+/// With fewer points a half is not judged.
 const FEWEST: usize = 10;
-/// Places whose distance is within so many robust deviations of the median are of the surface.
+/// Points whose distance is within this many robust deviations of the median belong to the surface.
 const USUAL: f64 = 2.0;
 
 #[derive(Clone, Copy, Debug)]
@@ -19,9 +19,9 @@ pub(super) struct Side {
     pub after: f64,
 }
 
-/// Places in order along the stripe, cut in the middle of those there are.
+/// `places` are in order along the stripe; they are split at the middle of their list.
 pub(super) fn halves(mut places: Vec<Side>) -> [Option<Side>; 2] {
-    // Normals of one sign, so that they can be added up.
+    // Give all normals the same sign, so that they can be summed.
     if let Some(first) = places.first().map(|p| p.normal) {
         for p in &mut places {
             let sign = p.normal.dot(&first).signum();

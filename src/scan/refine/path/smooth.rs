@@ -1,4 +1,4 @@
-//! In: numbers along a path, seen from each of its places. Out: by how much each place lies off the smooth path
+//! In: numbers along a path, relative to each of its poses. Out: the distance of each pose from the smooth path
 //! through its neighbours.
 //! Frame and unit: the caller's; docs/math.md, Places that scatter (1) and (2).
 
@@ -6,39 +6,39 @@ use crate::solve::robust_scale;
 
 /// Half windows, in shots to each side.
 const WINDOWS: [usize; 6] = [2, 4, 8, 16, 32, 64];
-/// A wider window is believed while what it says lies within so many standard deviations of what all narrower ones
-/// said.
+/// A wider window is used while its result lies within this many standard deviations of the results of all narrower
+/// ones.
 const AGREE: f64 = 2.0;
-/// A place that lies farther off, in standard deviations, is where the path jumps: that is no scatter.
+/// A pose that deviates by more standard deviations than this is at a jump of the path, which is no scatter.
 const JUMP: f64 = 4.0;
 
-/// Half window over which departures have no mean and no slope.
+/// Half window over which the departures have their mean and slope removed.
 const BEND: usize = 16;
 
-/// Farthest place, in the list, that a place is compared with.
+/// Largest distance, in list entries, over which poses are compared.
 pub(super) const REACH: usize = WINDOWS[WINDOWS.len() - 1];
 
-/// One place's neighbourhood: how far along the path, and what each place there has less the place itself.
+/// One pose's neighbourhood: the distance along the path, and the numbers of each neighbour minus those of the pose.
 pub(super) type Around<const N: usize> = Vec<(f64, [f64; N])>;
 
-/// What scatters about a smooth path.
+/// Scatter of poses about a smooth path.
 pub(super) struct Departures<const N: usize> {
-    /// As [`scatter`].
+    /// As returned by [`scatter`].
     pub sigma: [f64; N],
-    /// Smooth path less place, for each.
+    /// Smooth path minus pose, for each pose.
     pub off: Vec<[f64; N]>,
 }
 
-/// By how much each number of a place scatters about the straight line through its two neighbours' own: standard
-/// deviation of one place.
+/// Scatter of each number of a pose about the straight line through its two neighbours: the standard deviation of
+/// one pose.
 pub(super) fn scatter<const N: usize>(places: usize, around: impl Fn(usize, usize) -> Around<N>) -> [f64; N] {
     let near: Vec<[f64; N]> = (1..places.saturating_sub(1)).filter_map(|k| off_the_chord(&around(k, 1))).collect();
     std::array::from_fn(|i| robust_scale(&mut near.iter().map(|off| off[i].abs()).collect::<Vec<f64>>(), 1))
 }
 
-/// `around(k, reach)` lists the places up to `reach` before and after place k, itself among them with 0. Lines
-/// through windows that grow until they disagree with narrower ones: intersection of confidence intervals
-/// [goldenshluger97], so that bends stay what they are.
+/// `around(k, reach)` lists the poses up to `reach` before and after pose k, including k itself at distance 0. Lines
+/// are fitted in windows that grow until they disagree with narrower ones: intersection of confidence intervals
+/// [goldenshluger97]. Bends of the path are therefore preserved.
 pub(super) fn departures<const N: usize>(places: usize, around: impl Fn(usize, usize) -> Around<N>) -> Departures<N> {
     let sigma = scatter(places, &around);
     let off: Vec<[f64; N]> = (0..places).map(|k| smoothed(&around(k, REACH), sigma)).collect();
@@ -46,8 +46,9 @@ pub(super) fn departures<const N: usize>(places: usize, around: impl Fn(usize, u
     Departures { sigma, off }
 }
 
-/// What of a departure is scatter: a bend that a window cut short lies in all departures there alike, and no surface
-/// tells it from its own height. Smoothed once more and taken away (Tukey's twicing).
+/// The part of a departure that is scatter. A bend that a window cut short is in all departures around it alike, and
+/// the surface cannot distinguish it from its own height. The departures are smoothed once more and the result is
+/// subtracted (Tukey's twicing).
 fn scattered<const N: usize>(off: &[[f64; N]], k: usize) -> [f64; N] {
     let near = k.saturating_sub(BEND)..(k + BEND + 1).min(off.len());
     let window: Vec<(f64, [f64; N])> = near.map(|j| (j as f64 - k as f64, off[j])).collect();
@@ -55,7 +56,8 @@ fn scattered<const N: usize>(off: &[[f64; N]], k: usize) -> [f64; N] {
     std::array::from_fn(|i| off[k][i] - smooth[i])
 }
 
-/// By how much the middle one of three places lies off the line through the others, as one place's own scatter.
+/// Distance of the middle one of three poses from the line through the others, scaled to the scatter of a single
+/// pose.
 fn off_the_chord<const N: usize>(three: &Around<N>) -> Option<[f64; N]> {
     let [(a, before), _, (b, after)] = three[..] else { return None };
     let (before_counts, after_counts) = (b / (b - a), -a / (b - a));
@@ -87,8 +89,8 @@ fn smoothed<const N: usize>(around: &Around<N>, sigma: [f64; N]) -> [f64; N] {
     std::array::from_fn(|i| if off[i].abs() > JUMP * sigma[i] { 0.0 } else { off[i] })
 }
 
-/// Least squares line through a window, at 0, and its standard deviation for places that scatter by 1; `None` for
-/// fewer than three.
+/// Least squares line through a window, evaluated at 0, and its standard deviation for poses that scatter by 1;
+/// `None` for fewer than three poses.
 fn line_at_zero<const N: usize>(window: &[(f64, [f64; N])]) -> Option<([f64; N], f64)> {
     let n = window.len() as f64;
     let mean = window.iter().map(|(x, _)| x).sum::<f64>() / n;
@@ -109,7 +111,7 @@ mod tests {
     use super::*;
     use crate::stages::noise::Noise;
 
-    /// Heights by place, scattered, from a path.
+    /// Heights along a path, with added scatter.
     fn of(path: impl Fn(usize) -> f64, n: usize, sigma: f64, seed: u64) -> (Vec<f64>, Departures<1>) {
         let mut noise = Noise(seed);
         let is: Vec<f64> = (0..n).map(|k| path(k) + sigma * noise.normal()).collect();

@@ -1,5 +1,5 @@
-//! In: a cloud, where the camera was reported at its shots. Out: how much the reported places scatter about a smooth
-//! path, how much of that the surface does not show, and the places and points without it.
+//! In: a cloud and the reported camera pose at each shot. Out: the scatter of the reported poses about a smooth
+//! path, the share of it that the surface does not show, and poses and points without that share.
 //! Frame and unit: the cloud's frame, mm, rad; docs/math.md, Places that scatter.
 
 use super::super::slope::slope;
@@ -10,25 +10,25 @@ use crate::geometry::{Base, Camera, Rigid, Twist, Vec3, exp};
 use crate::scan::{CloudPoint, PointSource, Shots};
 use std::collections::BTreeMap;
 
-/// Halves of shots that must have been compared.
+/// Least number of compared halves of shots.
 const FEWEST: usize = 16;
-/// Places that scatter by less, mm and rad, are exact.
+/// Poses that scatter by less than this, mm and rad, count as exact.
 const EXACT: f64 = 1e-8;
 
-/// How the reported places scatter; in scan.json.
+/// Scatter of the reported poses; in scan.json.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PathFound {
-    /// By how much a reported place scatters about a smooth path along the surface's normal, mm (1 sigma).
+    /// Scatter of a reported pose about a smooth path, along the surface's normal, mm (1 sigma).
     pub height_mm: f64,
-    /// The same of its turn that lifts one end of the stripe, degrees.
+    /// The same of its rotation that lifts one end of the stripe, degrees.
     pub roll_deg: f64,
-    /// Share of that scatter which the surface does not follow, so that it is the report's: 0 where the camera moved
-    /// as it was reported, 1 where it went smoothly.
+    /// Share of that scatter which the surface does not follow, so that it is an error of the report. It is 0 if the
+    /// camera moved as reported, 1 if it moved smoothly.
     pub share: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the share.
     pub share_sigma: f64,
-    /// Whether the share was taken out of the cloud.
+    /// Whether the share was removed from the cloud.
     pub taken_out: bool,
 }
 
@@ -41,27 +41,27 @@ impl std::fmt::Display for PathFound {
     }
 }
 
-/// What a scan's places come to.
+/// Result for a scan's poses.
 pub struct Straight {
     /// The figures.
     pub found: PathFound,
-    /// Of each shot where the camera was, and the motion of its points from where it was reported; empty where
-    /// nothing is taken out.
+    /// For each shot the corrected camera pose, and the motion of its points from where they were reported. Empty if
+    /// nothing is corrected.
     moved: BTreeMap<u32, (Rigid<Base, Camera>, Rigid<Base, Base>)>,
 }
 
-/// The directions in which a surface shows how its shots stood, camera frame.
+/// The directions in which a surface shows the poses of its shots, camera frame.
 struct Seen {
     /// Middle of the points, mm.
     anchor: Vec3,
     /// Along the surface's normal.
     height: Vec3,
-    /// Axis of the turn that lifts one end of the stripe.
+    /// Axis of the rotation that lifts one end of the stripe.
     roll: Vec3,
 }
 
-/// Looks at a cloud in the order of its shots, of pictures with so many pixels along the stripe; `None` where the
-/// places are exact or few, or no surface shows how they stood.
+/// Examines a cloud in the order of its shots; `pixels_along` is the pictures' size along the stripe. `None` if the
+/// poses are exact or few, or if no surface shows them.
 pub fn straight(cloud: &dyn PointSource, shots: &Shots, pixels_along: u32) -> Result<Option<Straight>> {
     let places: Vec<(u32, Rigid<Base, Camera>)> = shots.places().collect();
     let around = |k: usize, reach: usize| around(&places, k, reach, |t| t.vector().into());
@@ -88,7 +88,7 @@ pub fn straight(cloud: &dyn PointSource, shots: &Shots, pixels_along: u32) -> Re
 }
 
 impl Straight {
-    /// The points where they are with the camera on its path.
+    /// Moves points to where they lie with the camera on its smooth path.
     pub fn apply(&self, points: &mut [CloudPoint]) {
         for p in points {
             if let Some((_, motion)) = self.moved.get(&p.shot) {
@@ -97,18 +97,18 @@ impl Straight {
         }
     }
 
-    /// The shots with the camera on its path.
+    /// The shots with the camera on its smooth path.
     pub fn shots(&self, shots: &Shots) -> Shots {
         shots.moved(|shot, place| self.place(shot, place))
     }
 
-    /// Where the camera was at a shot that was reported at `place`.
+    /// Corrected pose of the camera at a shot that was reported at `place`.
     pub fn place(&self, shot: u32, place: Rigid<Base, Camera>) -> Rigid<Base, Camera> {
         self.moved.get(&shot).map_or(place, |(is, _)| *is)
     }
 }
 
-/// Places up to `reach` before and after the k-th, as steady motions from it, camera frame.
+/// Poses up to `reach` before and after the k-th, as steady motions from it, camera frame.
 fn around<const N: usize>(
     places: &[(u32, Rigid<Base, Camera>)],
     k: usize,
@@ -124,7 +124,7 @@ fn around<const N: usize>(
 }
 
 impl Seen {
-    /// From all that was compared; `None` where that shows no direction.
+    /// Averages over all compared halves; `None` if they show no direction.
     fn by(steps: &[Step], shots: &Shots) -> Option<Seen> {
         let (mut anchor, mut height, mut along) = (Vec3::zeros(), Vec3::zeros(), Vec3::zeros());
         for step in steps {
@@ -138,7 +138,7 @@ impl Seen {
         Some(Seen { anchor, height, roll: along.cross(&height).try_normalize(1e-9)? })
     }
 
-    /// Height and roll of the places around the k-th.
+    /// Height and roll of the poses around the k-th.
     fn around(&self, places: &[(u32, Rigid<Base, Camera>)], k: usize, reach: usize) -> Around<2> {
         around(places, k, reach, |t| [self.height.dot(&t.at(&self.anchor)), self.roll.dot(&t.w)])
     }
@@ -149,8 +149,8 @@ impl Seen {
         Rigid::new(turn, self.anchor - turn * self.anchor + self.height * height)
     }
 
-    /// By how much a shot would rise over the surface between its neighbours, were all three where the smooth path
-    /// has them, mm.
+    /// Height by which a shot would rise over the surface between its neighbours if all three were moved to the
+    /// smooth path, mm.
     fn lift(&self, step: &Step, shots: &Shots, off: &BTreeMap<u32, [f64; 2]>) -> f64 {
         let parts = [1.0, step.after - 1.0, -step.after];
         let of = |(shot, part): (u32, f64)| {
@@ -172,23 +172,23 @@ mod tests {
     const STEP: f64 = 0.3;
     const NOISE: f64 = 0.01;
 
-    /// A scan of a surface by a camera that looks down on it and a sheet that it sees from the side.
+    /// A scan of a surface by a camera that looks down on it. The camera sees the sheet from the side.
     struct Scene {
         shots: u32,
         along: Along,
-        /// How far the report scatters from where the camera is, and the camera from its path, mm; as many hundredths
-        /// of a degree.
+        /// Scatter of the report about the camera's pose, and of the camera about its path, mm. Rotations scatter by
+        /// a fifth of that number in degrees.
         report: f64,
         motion: f64,
         surface: fn(f64, f64) -> f64,
-        /// Turn of the camera from shot to shot, rad.
+        /// Rotation of the camera from shot to shot, rad.
         turn: f64,
     }
 
     const SCENE: Scene =
         Scene { shots: 120, along: Along::U, report: 0.0, motion: 0.0, surface: |x, y| 0.1 * x - 0.05 * y, turn: 0.0 };
 
-    /// A small motion about the middle of the light, camera frame.
+    /// A small random motion about the middle of the light, camera frame.
     fn scattered(noise: &mut Noise, mm: f64) -> Rigid<Camera, Camera> {
         let mut three = |s: f64| Vec3::new(s * noise.normal(), s * noise.normal(), s * noise.normal());
         let (v, w) = (three(mm), three((0.2 * mm).to_radians()));
@@ -197,8 +197,7 @@ mod tests {
     }
 
     impl Scene {
-        /// The cloud as it was reported, where the camera was reported, and the distance of each point from the
-        /// surface after `straight`.
+        /// The reported cloud and the reported camera poses.
         fn scan(&self, seed: u64) -> (Vec<CloudPoint>, Shots) {
             let mut noise = Noise(seed);
             let (mut cloud, mut places) = (Vec::new(), Vec::new());
@@ -211,7 +210,7 @@ mod tests {
                 let reported = is * scattered(&mut noise, self.report);
                 for k in 0..400 {
                     let x = 0.1 * f64::from(k) - 20.0;
-                    // The sheet is the camera's x-z plane; along it lies what it lights.
+                    // The sheet is the camera's x-z plane; the lit points lie in it.
                     let (mut z, direction) = (150.0, is.direction(&Vec3::z()));
                     for _ in 0..20 {
                         let p = is.point(&Vec3::new(x, 0.0, z));
@@ -227,10 +226,10 @@ mod tests {
             (cloud, Shots::new(self.along, places))
         }
 
-        /// What `straight` says, and the points' rms from the surface before and after.
+        /// The result of `straight`, and the points' rms distance from the surface before and after.
         fn straight(&self, seed: u64) -> (Option<PathFound>, f64, f64) {
             let (mut cloud, shots) = self.scan(seed);
-            // What lies an edge's height off was moved over the edge.
+            // Points that are off by the height of an edge were moved across the edge; they do not count.
             let rms = |cloud: &[CloudPoint]| {
                 let off =
                     |p: &CloudPoint| f64::from(p.position.z) - (self.surface)(p.position.x.into(), p.position.y.into());
@@ -244,7 +243,7 @@ mod tests {
         }
     }
 
-    /// Plate, slope, treads and blocks: what noise of 0.01 mm leaves, and a fifth of the scatter.
+    /// Plate, slope, treads and blocks. What remains is the effect of 0.01 mm of noise and a fifth of the scatter.
     #[test]
     fn a_report_that_scatters_is_taken_out() {
         let surfaces: [(&str, fn(f64, f64) -> f64); 4] = [
@@ -261,13 +260,14 @@ mod tests {
                 println!("{name}, {along:?}, {turn}: {found}; {before:.4} -> {after:.4} mm");
                 assert!(found.taken_out && (0.9..1.1).contains(&found.share), "{name}: {found:?}");
                 assert!((0.7..1.4).contains(&(found.height_mm / 0.02)), "{name}: {found:?}");
-                // Noise alone leaves 0.42; under a camera that turns a bend that is cut short left 0.8.
+                // Noise alone leaves 0.42. Without the second smoothing, bends cut short under a rotating camera
+                // left 0.8.
                 assert!(after < 0.6 * before, "{name}: {before} -> {after}");
             }
         }
     }
 
-    /// The arm trembles and says so: every shot stays where it was reported, to the bit.
+    /// The arm trembles and reports it: every shot stays where it was reported, to the bit.
     #[test]
     fn a_motion_that_scatters_and_is_reported_stays() {
         let sigmas: Vec<f64> = (0..40)
@@ -284,7 +284,7 @@ mod tests {
         assert!((0.2..1.25).contains(&rms), "{rms}");
     }
 
-    /// Half of the variance each: the half is taken out.
+    /// Each has half of the variance: half is corrected.
     #[test]
     fn of_both_the_reports_share_is_taken_out() {
         let (found, before, after) = Scene { report: 0.02, motion: 0.02, ..SCENE }.straight(5);
@@ -293,8 +293,8 @@ mod tests {
         assert!(after < 0.9 * before, "{before} -> {after}");
     }
 
-    /// Grooves along the stripe, as far apart as three shots, are the part's: with a report that is exact, and with
-    /// one that scatters.
+    /// Grooves along the stripe, with a period of three shots, belong to the part. They stay, with an exact report
+    /// and with one that scatters.
     #[test]
     fn grooves_along_the_stripe_stay() {
         let surface = |_: f64, y: f64| 0.02 * (y / (3.0 * STEP) * std::f64::consts::TAU).sin();
@@ -305,7 +305,7 @@ mod tests {
         assert!(found.unwrap().taken_out && after < 0.7 * before);
     }
 
-    /// What shows nothing changes nothing: few shots, a report that is exact, a camera that stands, a surface that is
+    /// Nothing is changed without evidence: few shots, an exact report, a camera at rest, a surface that is pure
     /// noise.
     #[test]
     fn where_nothing_is_shown_nothing_is_done() {

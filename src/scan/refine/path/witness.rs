@@ -1,5 +1,5 @@
-//! In: a cloud, shot by shot. Out: by how much each shot's line over a surface stands off the surface between the
-//! shots before and after, left and right of its middle.
+//! In: a cloud, shot by shot. Out: the distance of each shot's line from the surface between the shots before and
+//! after it, left and right of its middle.
 //! Frame and unit: the cloud's frame, mm; docs/math.md, Places that scatter (3).
 
 use super::sides::{Side, halves};
@@ -7,33 +7,34 @@ use crate::fault::Result;
 use crate::geometry::Vec3;
 use crate::scan::{Along, CloudPoint, PointSource};
 
-/// Places along the stripe at which a shot is compared: enough that noise is no matter, few enough for large pictures.
+/// Positions along the stripe at which a shot is compared: enough to average out noise, few enough for large
+/// pictures.
 const PLACES: f32 = 512.0;
-/// A surface's slope along the stripe is taken over so many places to both sides.
+/// A surface's slope along the stripe is taken over this many positions to both sides.
 const BESIDE: usize = 3;
-/// A shot lies between its neighbours where it is no nearer to one of them than this share of their distance.
+/// A shot lies between its neighbours if its distance from each is at least this share of their distance.
 const BETWEEN: f64 = 0.1;
 
-/// What half of a shot's line says.
+/// What half of a shot's line shows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Step {
     /// The shot, and those before and after it.
     pub shots: [u32; 3],
-    /// Where, and the surface's unit normal there.
+    /// Position, and the surface's unit normal there.
     pub at: Vec3,
     pub normal: Vec3,
     /// Unit vector along the stripe.
     pub along: Vec3,
     /// Distance from the neighbours' surface along the normal, mm.
     pub off: f64,
-    /// Share of the shot after in that surface.
+    /// Weight of the shot after in that surface.
     pub after: f64,
 }
 
-/// A shot's points by place along the stripe.
+/// A shot's points by position along the stripe.
 struct Line {
     shot: u32,
-    /// Sum of the positions and how many they are.
+    /// Sum of the positions and their number.
     places: Vec<(Vec3, f64)>,
 }
 
@@ -52,7 +53,7 @@ impl Line {
     }
 }
 
-/// Of a cloud whose points come in the order of their shots; `along_px`: pixels of a picture along the stripe.
+/// The cloud's points must come in the order of their shots; `along_px` is the pictures' size along the stripe.
 pub(super) fn steps(cloud: &dyn PointSource, along: Along, along_px: u32) -> Result<Vec<Step>> {
     let px = (along_px as f32 / PLACES).ceil().max(1.0);
     let mut lines: [Option<Line>; 3] = [None, None, None];
@@ -73,7 +74,7 @@ pub(super) fn steps(cloud: &dyn PointSource, along: Along, along_px: u32) -> Res
     Ok(steps)
 }
 
-/// Both halves of the middle one of three lines; none of one with too few places.
+/// Both halves of the middle one of three lines; empty for a line with too few points.
 fn of_three(lines: &[Option<Line>; 3]) -> Vec<Step> {
     let [Some(before), Some(line), Some(after)] = lines else { return Vec::new() };
     let places = (BESIDE..line.places.len()).filter_map(|k| {

@@ -1,5 +1,5 @@
-//! In: a cloud, shot by shot. Out: each shot's line with, for each of its points, how fast the light grows from shot
-//! to shot there and how far the point moves along its ray when the sheet does.
+//! In: a cloud, shot by shot. Out: each shot's line with two quantities for each of its points: how fast the light
+//! grows there from shot to shot, and how far the point moves along its ray when the sheet moves.
 //! Frame and unit: the cloud's frame, mm; docs/math.md, Sheets that are thick (2) and (3).
 
 use crate::fault::Result;
@@ -8,23 +8,23 @@ use crate::scan::{Along, CloudPoint, PointSource, Shots};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Points of another line are beside a point up to so many pixels along the stripe, the nearer the heavier.
+/// Points of another line count as neighbours up to this many pixels along the stripe, closer ones with more weight.
 const BESIDE_PX: f32 = 1.5;
-/// Stripes that are narrower, or that nobody measured, px: centres of one surface lie closer than a pixel.
+/// Least stripe width, px, for narrower or unmeasured stripes: centres on one surface differ by less than a pixel.
 const LEAST_PX: f32 = 1.0;
-/// Light that changes by more than this from one shot to the next, as a logarithm, counts as this: it ends there, and
-/// where between the two nobody knows.
+/// Largest change of the light from one shot to the next, as a logarithm; larger ones are clamped to it. There the
+/// light ends, and where between the two shots is unknown.
 const MOST: f64 = 1.5;
 
-/// What a point's neighbours in the shots before and after say of it.
+/// What a point's neighbours in the shots before and after show about it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pull {
     /// Change of the light's logarithm from shot to shot.
     pub change: f64,
-    /// By how much that of the point lies below the mean of its neighbours': light that falls on an edge, or on a
-    /// line thinner than the shots show.
+    /// Difference between the mean of the neighbours' logarithms and the point's own. It marks light that falls on
+    /// an edge, or on a line thinner than the shots resolve.
     pub dip: f64,
-    /// How the point moves for a change of 1 and a sheet of variance 1 mm².
+    /// Displacement of the point for a change of 1 and a sheet of variance 1 mm².
     pub per: Vec3,
 }
 
@@ -32,14 +32,14 @@ pub(super) struct Pull {
 pub(super) struct Line {
     pub shot: u32,
     pub points: Vec<CloudPoint>,
-    /// Logarithms of the points' light.
+    /// Logarithms of the points' intensity.
     lights: Vec<f64>,
-    /// Where the camera was.
+    /// Pinhole and sheet at the shot, if its pose is known.
     place: Option<Place>,
-    /// Indices of the points in their order along the stripe, with their places there, px.
+    /// Indices of the points in their order along the stripe, with their positions there, px.
     order: Vec<(f32, u32)>,
     along: Along,
-    /// What lies so far across the stripe counts half, px.
+    /// Distance across the stripe at which a neighbour's weight is halved, px.
     width_px: f32,
 }
 
@@ -49,14 +49,14 @@ struct Place {
     sheet: Plane<Base>,
 }
 
-/// A line and what those beside it say of its points, one each.
+/// A line, and what its neighbours show about its points, one entry a point.
 #[derive(Clone)]
 pub(super) struct Pulled {
     pub line: Arc<Line>,
     pub pulls: Vec<Pull>,
 }
 
-/// Where a point lies along its stripe and across it, px.
+/// Position of a point along its stripe and across it, px.
 fn in_picture(along: Along, p: &CloudPoint) -> (f32, f32) {
     if along == Along::U { (p.u, p.v) } else { (p.v, p.u) }
 }
@@ -80,7 +80,8 @@ impl Line {
         Line { shot, points, lights, place, order, along: shots.along, width_px }
     }
 
-    /// The points of it that are beside a point of another line: index, distances along and across the stripe, px.
+    /// This line's points that are neighbours of a point of another line: index, distances along and across the
+    /// stripe, px.
     fn beside(&self, p: &CloudPoint) -> impl Iterator<Item = (usize, f32, f32)> + '_ {
         let (along, across) = in_picture(self.along, p);
         let first = self.order.partition_point(|(a, _)| *a <= along - BESIDE_PX);
@@ -91,20 +92,20 @@ impl Line {
         })
     }
 
-    /// The point of it that is nearest to a point of another line.
+    /// This line's point that is nearest to a point of another line.
     pub fn nearest(&self, p: &CloudPoint) -> Option<usize> {
         let square = |(_, along, across): &(usize, f32, f32)| along * along + across * across;
         self.beside(p).min_by(|a, b| square(a).total_cmp(&square(b))).map(|(i, _, _)| i)
     }
 
-    /// Logarithm of the light beside a point of another line, and how much of it is there, 0..=1: a mean whose
-    /// weights have no steps, so that it has none where this line's points lie a little otherwise. What lies widths
-    /// of the stripe away across it is of another surface, and counts for little.
+    /// Logarithm of the light next to a point of another line, and the weight of the points found there, 0..=1. The
+    /// mean's weights are continuous, so that small shifts of this line's points do not cause jumps. Points several
+    /// stripe widths away across it are of another surface and count little.
     fn light(&self, p: &CloudPoint) -> (f64, f64) {
         let (mut sum, mut sure, mut all) = (0.0, 0.0, 0.0);
         for (i, along, across) in self.beside(p) {
             let weight = f64::from((1.0 - along / BESIDE_PX) / (1.0 + (across / self.width_px).powi(2)));
-            // A fit that determines its place badly does so with its light.
+            // A fit that determines its position poorly determines its intensity poorly too.
             let known = weight / f64::from(self.points[i].sigma_mm.max(1e-6)).powi(2);
             sum += known * self.lights[i];
             sure += known;
@@ -113,14 +114,14 @@ impl Line {
         if sure > 0.0 { (sum / sure, all.min(1.0)) } else { (0.0, 0.0) }
     }
 
-    /// What two lines say of a point of this one.
+    /// What two neighbouring lines show about a point of this one.
     fn pull(&self, i: usize, before: Option<&Line>, after: Option<&Line>) -> Pull {
         let p = &self.points[i];
         let (at, here) = (p.at(), self.light(p).0);
         let Some(Place { eye, sheet }) = &self.place else { return Pull::default() };
         let ray = at - eye;
-        // How much brighter a line is beside the point, how far its sheet stands from the point along the normal, and
-        // how much that counts.
+        // Of a neighbouring line: how much brighter it is next to the point, the distance of its sheet from the
+        // point along the normal, and its weight.
         let beside = |line: Option<&Line>| {
             let line = line?;
             let way = -line.place.as_ref()?.sheet.distance(&at);
@@ -129,7 +130,7 @@ impl Line {
         };
         let [a, from, before] = beside(before).unwrap_or_default();
         let [b, to, after] = beside(after).unwrap_or_default();
-        // Behind both, or before both, is nothing between them.
+        // If both sheets lie on the same side of the point, the point is not between them.
         if before + after <= 0.0 || before * after > 0.0 && from * to > 0.0 {
             return Pull::default();
         }
@@ -141,7 +142,7 @@ impl Line {
     }
 
     fn pulled(self: Arc<Line>, before: Option<&Line>, after: Option<&Line>) -> Pulled {
-        // What lies beside lies a shot away: over dark and missing ones nobody knows what happened between.
+        // Only adjacent shots are neighbours. Across dark and missing shots it is unknown what happened between.
         let next = |line: &&Line| line.shot.abs_diff(self.shot) == 1;
         let (before, after) = (before.filter(next), after.filter(next));
         let pulls =
@@ -150,7 +151,7 @@ impl Line {
     }
 }
 
-/// The lines of a cloud whose points come in the order of their shots, to `take` in that order.
+/// Passes the lines of a cloud, whose points come in the order of their shots, to `take` in that order.
 pub(super) fn lines(cloud: &dyn PointSource, shots: &Shots, take: &mut dyn FnMut(Pulled) -> Result<()>) -> Result<()> {
     let (mut before, mut last): (Option<Arc<Line>>, Option<Arc<Line>>) = (None, None);
     let mut next: Vec<CloudPoint> = Vec::new();

@@ -1,5 +1,5 @@
-//! In: a scan's lines with what those beside them say. Out: the sheet's thickness as the cloud shows it, and the
-//! points without what it does where brightness changes.
+//! In: a scan's lines with what their neighbours show. Out: the sheet's thickness as the cloud shows it, and the
+//! points without its effect where brightness changes.
 //! Frame and unit: the cloud's frame, mm; docs/math.md, Sheets that are thick.
 
 use super::super::slope::{Slope, slope};
@@ -9,35 +9,35 @@ use crate::scan::{CloudPoint, PointSource, Shots};
 use crate::solve::robust_scale;
 use std::collections::VecDeque;
 
-/// A point is compared with those beside it where it lies between them, no nearer to one of them than this share of
-/// their distance.
+/// A point is compared with its neighbours if it lies between them, at least this share of their distance from each.
 const BETWEEN: f64 = 0.2;
-/// And where their depths differ by less than this share of it: an edge says nothing.
+/// The neighbours' depths must differ by less than this share of their distance: a comparison across an edge is
+/// useless.
 const LEVEL: f64 = 0.6;
-/// What lies farther off than so many robust deviations is an edge.
+/// Residuals beyond this many robust deviations are edges.
 const EDGE: f64 = 10.0;
-/// Changes of light from shot to shot within so many of their robust deviations are speckle and noise: a point in 80
-/// of pure noise is moved.
+/// Changes of light from shot to shot within this many of their robust deviations count as speckle and noise. A
+/// point in 80 of pure noise is moved.
 const SPECKLE: f64 = 2.5;
-/// But none beyond this: where most of a surface is printed, they are the print.
+/// Upper bound of that limit: on a mostly printed surface the usual changes are the print itself.
 const UNCHANGED: f64 = 0.25;
-/// Fewer comparisons say nothing.
+/// With fewer comparisons nothing is concluded.
 const FEWEST: usize = 256;
-/// More are thinned out.
+/// Above this number comparisons are thinned out.
 const MOST: usize = 1 << 16;
 const ROUNDS: usize = 5;
 
-/// What the sheet's thickness does where brightness changes; in scan.json.
+/// Effect of the sheet's thickness where brightness changes; in scan.json.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SheetFound {
-    /// The standard deviation across of the sheet that it acts as, mm: within 0.7 and 1.6 of the real one, less where
-    /// shots lie farther apart than three of those.
+    /// Standard deviation of the light across the sheet, as its effect shows it, mm. It is within 0.7 and 1.6 of the
+    /// real one, and less if shots lie farther apart than three of those.
     pub thickness_mm: f64,
     /// Standard deviation of that.
     pub thickness_sigma_mm: f64,
-    /// What is left where brightness changes scatters as a sheet of this standard deviation pulls, mm; it is in the
-    /// points' sigma.
+    /// The remaining scatter where brightness changes equals the shifts by a sheet of this standard deviation, mm.
+    /// It is included in the points' sigma.
     pub scatter_mm: f64,
     /// Share of the points that were moved by more than their standard deviation.
     pub moved: f64,
@@ -56,17 +56,17 @@ impl std::fmt::Display for SheetFound {
     }
 }
 
-/// What a cloud shows of its sheet.
+/// What a cloud shows about its sheet.
 #[derive(Clone, Copy, Debug)]
 pub struct Thick {
     /// Variance of the sheet, mm².
     square: Slope,
-    /// By how much points scatter about what that does to them, as a variance of the sheet, mm².
+    /// Remaining scatter of the points about that effect, as a variance of the sheet, mm².
     left: f64,
     quiet: Quiet,
 }
 
-/// Changes and dips that are speckle and noise.
+/// Limits of changes and dips that are speckle and noise.
 #[derive(Clone, Copy, Debug)]
 struct Quiet {
     change: f64,
@@ -78,23 +78,23 @@ struct Quiet {
 struct Part {
     change: f64,
     dip: f64,
-    /// How far a change of 1 and a sheet of 1 mm² move the comparison along the ray, mm.
+    /// Shift of the comparison along the ray for a change of 1 and a sheet of 1 mm², mm.
     by: f64,
 }
 
-/// A point between those beside it.
+/// A point between its two neighbours.
 #[derive(Clone, Copy)]
 struct Between {
-    /// How far it lies beyond them along its ray, mm, and the variance that all three state of that.
+    /// Its distance beyond them along its ray, mm, and the stated variance of that distance from all three.
     beyond: f64,
     stated: f64,
-    /// Itself and the two.
+    /// The point itself and the two neighbours.
     parts: [Part; 3],
 }
 
 impl Thick {
-    /// Looks at a cloud in the order of its shots; `None` where nobody wrote the sheet down, or where it does not
-    /// show that brightness pulls its points.
+    /// Examines a cloud in the order of its shots. `None` if the sheet is not recorded, or if the cloud does not
+    /// show that brightness shifts its points.
     pub fn of(cloud: &dyn PointSource, shots: &Shots) -> Result<Option<Thick>> {
         let (mut all, mut every, mut seen) = (Vec::new(), 1, 0_usize);
         let mut three: VecDeque<Pulled> = VecDeque::new();
@@ -135,7 +135,7 @@ impl Thick {
         Ok(Some(Thick { square, left, quiet }))
     }
 
-    /// The points without it, line by line in their order.
+    /// Passes the corrected points to `take`, line by line in their order.
     pub fn apply(
         &self,
         cloud: &dyn PointSource,
@@ -166,28 +166,28 @@ impl Thick {
 }
 
 impl Quiet {
-    /// What of a change is one.
+    /// The part of a change that exceeds speckle and noise.
     fn change_of(&self, change: f64) -> f64 {
         beyond(change, self.change)
     }
 
-    /// What change and dip leave open of where the light's middle lies, as the size of a change.
+    /// Uncertainty that change and dip leave about the light's middle, expressed as the size of a change.
     fn unsure(&self, change: f64, dip: f64) -> f64 {
         self.change_of(change).hypot(beyond(dip, self.dip))
     }
 }
 
-/// A number beyond twice a size, nothing within it, and what leads from one to the other without a step, so that
-/// nothing hangs on which side of one it lies.
+/// Soft threshold: 0 within `size`, the number itself beyond twice `size`, and linear between the two. It has no
+/// step, so that a result never depends on which side of a limit a number lies.
 fn beyond(number: f64, size: f64) -> f64 {
     let over = number.abs() - size;
     number.signum() * (2.0 * over).clamp(0.0, number.abs())
 }
 
-/// By how much points scatter where brightness changes, as a variance of the sheet: of (sum of squares of what is
-/// unsure, rest, its stated variance) what the squared rests grow by beyond that variance as most of them have it,
-/// each as heavy as chance lets it be. No less than a sheet of variance `square` moves them by: of a surface that is
-/// printed all over most hold pulls already.
+/// Scatter of the points where brightness changes, as a variance of the sheet. Each entry is (sum of squares of what
+/// is unsure, residual, its stated variance). The stated variance is scaled to the residuals' usual size; the slope
+/// of the squared residuals beyond it is fitted by weighted least squares. The result is at least `square`, because
+/// on a surface that is printed all over most residuals contain shifts already.
 fn left(rests: &[[f64; 3]], square: f64) -> f64 {
     let mut over: Vec<f64> = rests.iter().map(|[_, rest, stated]| rest.abs() / stated.sqrt()).collect();
     let usual = robust_scale(&mut over, 1).powi(2);
@@ -209,7 +209,7 @@ fn left(rests: &[[f64; 3]], square: f64) -> f64 {
     grows.sqrt()
 }
 
-/// The `i`-th point of a line between its neighbours; `None` where it has none, or lies at an edge.
+/// The `i`-th point of a line between its neighbours; `None` if it lacks one, or lies at an edge.
 fn between(before: &Pulled, line: &Pulled, i: usize, after: &Pulled) -> Option<Between> {
     let (p, pull) = (&line.line.points[i], &line.pulls[i]);
     let (j, k) = (before.line.nearest(p)?, after.line.nearest(p)?);
@@ -229,7 +229,7 @@ fn between(before: &Pulled, line: &Pulled, i: usize, after: &Pulled) -> Option<B
     let part = |&Pull { change, dip, per }: &Pull, part: f64| Part { change, dip, by: part * per.dot(&ray) };
     let stated = |p: &CloudPoint, part: f64| (f64::from(p.sigma_mm) * part).powi(2);
     let stated = stated(p, 1.0) + stated(&before.line.points[j], 1.0 - share) + stated(&after.line.points[k], share);
-    // A fit that its light does not determine states any size, up to none that is a number.
+    // A fit that its light does not determine states any size, even infinite or NaN.
     stated.is_normal().then_some(Between {
         beyond: to.dot(&ray) - share * deeper,
         stated,
@@ -244,25 +244,25 @@ mod tests {
     use crate::scan::Along;
     use crate::stages::noise::Noise;
 
-    /// A scan by a camera 150 mm over a surface, with a sheet 60 mm beside it.
+    /// A scan by a camera 150 mm above a surface, with a sheet 60 mm beside it.
     #[derive(Clone, Copy)]
     struct Scene {
         shots: u32,
         along: Along,
-        /// From shot to shot, mm, and turn of camera and sheet about the vertical, rad.
+        /// Distance from shot to shot, mm, and rotation of camera and sheet about the vertical, rad.
         step: f64,
         turn: f64,
         /// Standard deviation of the sheet, mm.
         thick: f64,
         height: fn(f64, f64) -> f64,
         albedo: fn(f64, f64) -> f64,
-        /// Of the light from point to point, and of the laser from shot to shot, as logarithms.
+        /// Scatter of the light from point to point, and of the laser from shot to shot, as logarithms.
         speckle: f64,
         flicker: f64,
         focal_px: f64,
     }
 
-    /// Print 1.6 mm wide and as far apart, its edges 0.15 mm wide, four times as bright as the ground.
+    /// Printed lines 1.6 mm wide with gaps as wide, edges 0.15 mm wide, four times as bright as the ground.
     fn print(x: f64, y: f64) -> f64 {
         let wave = (y / 1.6 * std::f64::consts::PI + 0.3 * x).sin();
         0.25 + 0.75 / (1.0 + (-wave * 1.6 / std::f64::consts::PI / 0.05).exp())
@@ -287,8 +287,8 @@ mod tests {
     }
 
     impl Scene {
-        /// Light falls on the surface as a Gaussian about the sheet's middle and comes back as the surface is bright;
-        /// a point lies where the sheet's middle meets the ray of that light's centre.
+        /// The light on the surface is a Gaussian about the sheet's middle times the surface's albedo. A point lies
+        /// where the sheet's middle meets the ray of that light's centre.
         fn scan(&self, seed: u64) -> (Vec<CloudPoint>, Shots) {
             let mut noise = Noise(seed);
             let (mut cloud, mut places) = (Vec::new(), Vec::new());
@@ -346,7 +346,7 @@ mod tests {
             (cloud.iter().map(off).sum::<f64>() / cloud.len() as f64).sqrt()
         }
 
-        /// What is found, and the points' rms from the surface before and after.
+        /// The result, and the points' rms distance from the surface before and after.
         fn refined(&self, seed: u64) -> (Option<SheetFound>, f64, f64) {
             let (cloud, shots) = self.scan(seed);
             let before = self.rms(&cloud);
@@ -361,7 +361,8 @@ mod tests {
         }
     }
 
-    /// Lying and upright, forwards and back, straight and turning, a shot each 1 to 4 standard deviations of the sheet.
+    /// Lying and upright stripes, forwards and back, straight and turning, with shots 1 to 4 standard deviations of
+    /// the sheet apart.
     #[test]
     fn print_no_longer_pulls_the_points_about() {
         for (name, scene) in [
@@ -390,7 +391,7 @@ mod tests {
         }
     }
 
-    /// Where the sheet's middle met the light is not lost.
+    /// The intersection of the sheet's middle with the ray can be restored.
     #[test]
     fn points_go_back_onto_the_sheet() {
         let (cloud, shots) = PRINTED.scan(5);
@@ -401,7 +402,7 @@ mod tests {
             Ok(())
         });
         taken.unwrap();
-        // Noise along the vertical has put the points off the sheet.
+        // Noise along the vertical has moved the points off the sheet.
         let mut before = cloud.clone();
         shots.onto_sheet(&mut before);
         let apart = |a: &[CloudPoint], b: &[CloudPoint]| {
@@ -413,11 +414,11 @@ mod tests {
         assert!(moved > 0.05 && apart(&before, &after) < 1e-4);
     }
 
-    /// What is left of a pulled point is in its standard deviation.
+    /// The remaining error of a corrected point is in its standard deviation.
     #[test]
     fn points_that_were_moved_state_it() {
         let (mut cloud, shots) = PRINTED.scan(3);
-        // Not determined, and exact.
+        // One point that is not determined, and an exact one.
         for (p, sigma_mm) in cloud[5000..].iter_mut().zip([f32::INFINITY, 0.0]) {
             p.sigma_mm = sigma_mm;
         }
@@ -441,14 +442,14 @@ mod tests {
         assert!((0.2..0.7).contains(&moved) && (0.1..0.2).contains(&scatter_mm), "{moved}, {scatter_mm}");
     }
 
-    /// Where nothing pulls, nothing is moved: even light, speckle, a laser that flickers, a sheet that is thin,
-    /// ridges that are bright, few shots, shots that nobody knows the places of.
+    /// Without an effect nothing is moved: uniform brightness, speckle, a flickering laser, a thin sheet, bright
+    /// ridges, few shots, shots with unknown poses.
     #[test]
     fn what_is_not_pulled_is_not_moved() {
         let even = Scene { albedo: |_, _| 1.0, ..PRINTED };
-        // Its light stands for the surface's where no point is off.
+        // With a thin sheet the intensity follows the surface's brightness without shifting any point.
         let thin = Scene { thick: 0.005, ..PRINTED };
-        // 0.3 mm high: the print itself.
+        // 0.3 mm high, in the shape of the print.
         let ridges = Scene { height: |x, y| 0.4 * print(x, y), ..thin };
         for (name, scene) in [
             ("even", even),
