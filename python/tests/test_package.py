@@ -41,7 +41,11 @@ def test_everything_says_what_it_is():
 def test_the_types_are_those_of_the_code(check, tmp_path):
     if importlib.util.find_spec("mypy") is None:
         pytest.skip("mypy is not installed")
-    command = [sys.executable, "-m", *check, *(["--cache-dir", str(tmp_path)] if check[0] == "mypy" else [])]
+    # stubtest sees a class within a method as one of the module, by its line.
+    local = tmp_path / "local"
+    local.write_text(r"sheetlight\.batch\.cluster\.Runner@\d+" + "\n")
+    more = ["--cache-dir", str(tmp_path)] if check[0] == "mypy" else ["--allowlist", str(local)]
+    command = [sys.executable, "-m", *check, *more]
     # Where the package is installed, whatever the folder of this test.
     place = str(Path(sheetlight.__file__).parents[1])
     env = {**os.environ, "MYPYPATH": place, "PYTHONPATH": place}
