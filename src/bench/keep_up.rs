@@ -1,5 +1,5 @@
-//! In: pictures a second. Out: what of a camera that sends so many the newest-picture chain measures, at half and at
-//! full resolution, counted while it runs: every picture stands under its own name.
+//! In: a rate of pictures. Out: how many pictures of a camera with that rate the newest-picture chain measures, at
+//! half and at full resolution. Every picture is counted in one class.
 //! Frame and unit: px, pictures, ms from a picture's last byte to its points.
 
 use super::scenes::{Scene, pictures};
@@ -14,40 +14,40 @@ use crate::scan::{Extraction, Live, Where};
 use crate::stages::stripe::point::Optics;
 use std::time::Duration;
 
-/// Half of the resolution, and all of it.
+/// Half of the resolution, and the full resolution.
 const SIZES: [(u32, u32); 2] = [(640, 480), (1280, 960)];
-/// Different pictures that are sent in turn.
+/// Number of different pictures that are sent in turn.
 const PICTURES: u32 = 8;
-/// Waited for a picture at most so long before is looked whether it is over.
+/// Longest wait for a picture before the end of the run is checked.
 const WITHIN: Duration = Duration::from_millis(100);
 
 /// What became of a camera's pictures.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct KeptUp {
-    /// What measured them.
+    /// Processor or device that measured them.
     pub on: String,
     /// Columns, px.
     pub width: u32,
     /// Rows, px.
     pub height: u32,
-    /// Pictures a second that were sent.
+    /// Rate of the camera, pictures a second.
     pub rate_hz: f64,
     /// Pictures that were sent.
     pub sent: u64,
-    /// Of these with points.
+    /// Sent pictures that gave points.
     pub measured: u64,
-    /// Passed over, because a newer one had come.
+    /// Pictures skipped because a newer one had arrived.
     pub passed_over: u64,
-    /// Lost otherwise: nobody had taken them from the camera in time, or they showed no stripe.
+    /// Pictures lost otherwise: not taken from the camera in time, or without a stripe.
     pub lost: u64,
-    /// From a picture's last byte to its points, ms: half of them take less, and all but one in a hundred.
+    /// Time from a picture's last byte to its points, ms: median and 99th percentile.
     pub ms: [f64; 2],
 }
 
-/// Runs the chain at both sizes for so many seconds each.
+/// Runs the chain at both sizes for `seconds` each.
 ///
 /// # Errors
-/// A rate or time out of range; no GPU where one is asked for; no thread.
+/// A rate or time out of range; no GPU if one is requested; no thread.
 pub fn keep_up(rate_hz: f64, seconds: f64, place: Where) -> Result<Vec<KeptUp>> {
     if !(0.1..=10_000.0).contains(&rate_hz) || !(0.1..=600.0).contains(&seconds) {
         return Err(Fault::usage(format!(
@@ -63,7 +63,7 @@ fn at((width, height): (u32, u32), rate_hz: f64, seconds: f64, place: Where) -> 
     let format = Format { width, height, bits: 8 };
     let rig = rig(&Scene::OneStripe.optics(width, height), width, height);
     let mut live = Live::new(&rig, format, &Extraction::default(), None, place)?;
-    // The first ones compile and learn the stripe.
+    // The first pictures compile the chain and determine the stripe.
     for image in &images {
         live.measure(0, image.clone())?;
     }
@@ -102,7 +102,7 @@ fn at((width, height): (u32, u32), rate_hz: f64, seconds: f64, place: Where) -> 
     })
 }
 
-/// A rig that sees these pictures.
+/// A rig that fits these pictures.
 fn rig(o: &Optics, width: u32, height: u32) -> Rig {
     let [fx, fy, cx, cy, skew] = o.pinhole.map(f64::from);
     let mut lens = [0.0; 14];
@@ -121,11 +121,11 @@ fn rig(o: &Optics, width: u32, height: u32) -> Rig {
     Rig { laser_plane: Some(laser_plane), camera: Some(camera), ..Rig::default() }
 }
 
-/// A camera that runs at its own pace: what nobody takes in time is lost, and its numbers show it.
+/// A camera that runs at its own pace: pictures not taken in time are lost, which its numbers show.
 struct Paced {
     images: Vec<Image>,
     format: Format,
-    /// ns.
+    /// Time between two pictures, ns.
     period: u64,
     start: u64,
     next: u64,
@@ -166,7 +166,7 @@ impl PictureSource for Paced {
 mod tests {
     use super::*;
 
-    /// `Err` where too little was measured to compare, which a machine that stands still brings about.
+    /// `Err` if too little was measured for a comparison, which happens when the machine stalls.
     fn slow_and_fast() -> std::result::Result<(), String> {
         let kept = |rate_hz, seconds| keep_up(rate_hz, seconds, Where::Cpu).map_err(|e| e.what);
         for k in kept(8.0, 0.6)? {
@@ -176,7 +176,7 @@ mod tests {
                 return Err(format!("{k:?}"));
             }
         }
-        // More than any machine measures: the rest is passed over or lost, and said so.
+        // A higher rate than any machine can measure: the remaining pictures are counted as skipped or lost.
         let fast = kept(10_000.0, 0.5)?;
         for k in &fast {
             assert_eq!(k.sent, k.measured + k.passed_over + k.lost, "{k:?}");

@@ -1,4 +1,4 @@
-//! In: this machine. Out: what a plain read of memory and an upload can carry, CPU time, peak memory.
+//! In: this machine. Out: the bandwidth of a plain memory read and of an upload, CPU time, peak memory.
 //! Frame and unit: 1e9 bytes a second, seconds, bytes.
 
 use crate::fault::Result;
@@ -9,15 +9,15 @@ use std::time::Instant;
 /// The limits that the chain is compared with.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Ceilings {
-    /// One thread adding up 12.6 MB, the best of many: the floor of any chain that looks at every pixel.
+    /// One thread summing 12.6 MB, the best of many runs: the upper limit for any chain that reads every pixel.
     pub read_gb_s: f64,
     /// The same on all threads.
     pub read_all_gb_s: f64,
-    /// Host to where the stages read.
+    /// Transfer from the host to the memory that the stages read.
     pub upload_gb_s: Option<f64>,
-    /// From where the stages write to the host.
+    /// Transfer from the memory that the stages write to the host.
     pub readback_gb_s: Option<f64>,
-    /// Within the device's own memory, where it has its own: bytes read and written.
+    /// Bytes read and written within the device's dedicated memory, if it has one.
     pub device_gb_s: Option<f64>,
 }
 
@@ -33,7 +33,8 @@ fn sum(words: &[u64]) -> u64 {
 }
 
 impl Ceilings {
-    /// Reads 12.6 MB pictures out of a set larger than most caches; none is all zeros, which would be one page.
+    /// Reads pictures of 12.6 MB out of a set larger than most caches. None is all zeros, because that would occupy
+    /// a single page.
     pub fn measure(device: Option<&Device>) -> Result<Ceilings> {
         let frames: Vec<Vec<u64>> = (1..=8).map(|i| vec![i; 4096 * 3072 / 8]).collect();
         let bytes = (4096 * 3072) as f64;
@@ -67,7 +68,7 @@ impl Ceilings {
     }
 }
 
-/// CPU seconds that all threads of this process have used; `None` where the system does not tell (Linux does).
+/// CPU seconds that all threads of this process have used; `None` if the system does not report them (Linux does).
 pub fn cpu_seconds() -> Option<f64> {
     // schedstat counts nanoseconds, /proc/self/stat only hundredths of a second.
     let mut sum = 0u64;
@@ -78,12 +79,12 @@ pub fn cpu_seconds() -> Option<f64> {
     Some(sum as f64 * 1e-9)
 }
 
-/// Most memory that this process has held at once; `None` where the system does not tell.
+/// Most memory that this process has held at once; `None` if the system does not report it.
 pub fn peak_memory_bytes() -> Option<u64> {
     status("VmHWM:")
 }
 
-/// Memory that this process holds now; `None` where the system does not tell.
+/// Memory that this process holds now; `None` if the system does not report it.
 pub fn resident_bytes() -> Option<u64> {
     status("VmRSS:")
 }

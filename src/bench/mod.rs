@@ -1,5 +1,5 @@
-//! In: picture sizes and scenes. Out: how fast the chain is on this machine, stage by stage, against what
-//! its memory and its upload path could carry. Frame and unit: seconds, pixels, bytes, 1e9 bytes a second.
+//! In: picture sizes and scenes. Out: the speed of the chain on this machine, stage by stage, compared with the
+//! limits of its memory and upload bandwidth. Frame and unit: seconds, pixels, bytes, 1e9 bytes a second.
 
 mod keep_up;
 mod machine;

@@ -1,5 +1,5 @@
-//! In: on stdin one JSON line of settings, raw 8-bit pictures, then commands. Out: on stdout one JSON line an
-//! answer, raw masks and points: another program times its chain against ours on the same pictures, in turns.
+//! In: on stdin one JSON line of settings, raw 8-bit pictures, then commands. Out: on stdout one JSON line for each
+//! answer, raw masks and points. Another program times its chain against this one on the same pictures, in turns.
 //! Frame and unit: pixels; points in the camera's frame, mm; seconds.
 
 use super::machine;
@@ -40,27 +40,29 @@ struct Setup {
     /// Laser plane: normal · X = offset, mm.
     normal: [f32; 3],
     offset_mm: f32,
-    /// Sigma of the stripe, px; left out, it is learned from the pictures as a scan learns it.
+    /// Sigma of the stripe, px; if omitted it is measured from the pictures as in a scan.
     width_px: Option<f32>,
 }
 
-/// Every depth is believed: nothing is left out while the stripe is learned, mm.
+/// Accepts all depths, so that nothing is excluded while the stripe is measured, mm.
 const DEPTH_MM: [f64; 2] = [1.0, 1e5];
-/// Every point in the camera's own frame.
+/// A fixed pose: all points stay in the camera frame.
 const STILL: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
 #[derive(serde::Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 enum Command {
-    /// Run all pictures so many times over, several batches in flight, to a point for every skeleton pixel's middle.
+    /// Runs all pictures this many times, several batches in flight, with a point for the middle of every skeleton
+    /// pixel.
     Run(usize),
-    /// With the settings of a scan, so to peaks, their standard deviations and every reason against them.
+    /// As `Run`, with the settings of a scan: peaks, their standard deviations and all rejection reasons.
     RunFull(usize),
-    /// As RunFull on this machine's processor, all pictures at once, or one after the other.
+    /// As `RunFull` on this machine's processor: all pictures at once (`RunHost`), or one after the other
+    /// (`RunHostSingly`).
     RunHost(usize),
     RunHostSingly(usize),
-    /// x, y of the skeleton pixels of one picture and X, Y, Z of their points, little-endian f32, after their number
-    /// in JSON.
+    /// x, y of the skeleton pixels of one picture and X, Y, Z of their points, little-endian f32, preceded by their
+    /// number in JSON.
     Points(usize),
     /// The thresholded and the thinned mask of one picture, 0 and 255.
     Masks(usize),
@@ -73,7 +75,7 @@ fn broken(what: impl std::fmt::Display) -> Fault {
         .next("build both from the same commit")
 }
 
-/// Serves one peer until it says quit or closes the pipe.
+/// Serves one peer until it sends `quit` or closes the pipe.
 pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -> Result<()> {
     let mut line = String::new();
     input.read_line(&mut line).map_err(lost)?;
@@ -116,7 +118,7 @@ fn format(setup: &Setup) -> Format {
     Format { width: setup.width, height: setup.height, bits: 8 }
 }
 
-/// The stripe as a scan with this camera and laser plane learns it before its first profile.
+/// Measures the stripe as a scan with this camera and laser plane does before its first profile.
 fn learned(setup: &Setup, images: &[Image]) -> Result<Stripe> {
     let [fx, fy, cx, cy, skew] = setup.pinhole.map(f64::from);
     let terms = setup.distortion.map(f64::from);
@@ -141,20 +143,20 @@ fn learned(setup: &Setup, images: &[Image]) -> Result<Stripe> {
     Ok(seen.ok_or_else(|| broken("no picture shows enough of a stripe to learn its width"))?.stripe)
 }
 
-/// The peer's pictures, and this program's chains under its settings.
+/// The peer's pictures, and this program's chains with the peer's settings.
 struct Ours {
     images: Vec<Image>,
-    /// To a point for every skeleton pixel's middle; and one picture at a time.
+    /// Chains with a point for the middle of every skeleton pixel: in batches, and one picture at a time.
     chain: Chain,
     single: Chain,
-    /// With the settings of a scan; and on the processor.
+    /// Chains with the settings of a scan: on the device, and on the processor.
     full: Chain,
     host: Host,
     width_px: f32,
 }
 
 impl Ours {
-    /// Compiles all of them and runs those once that will be timed on the device.
+    /// Compiles all chains, and runs those once that will be timed on the device.
     fn new(device: &Device, setup: &Setup, images: Vec<Image>) -> Result<Ours> {
         let optics = Optics {
             pinhole: setup.pinhole,
@@ -168,7 +170,7 @@ impl Ours {
             None => learned(setup, &images)?,
         };
         let peak = PeakParams { width_px: stripe.width_px, ..PeakParams::default() };
-        // The other side refuses nothing either.
+        // No peak is rejected, as in the other program.
         let pixels =
             Measure { peak: PeakParams { method: Method::Pixel, ..peak }, choose: ChooseParams::lenient(), optics };
         let config = ChainConfig {
@@ -192,7 +194,7 @@ impl Ours {
         Ok(Ours { images, chain, single, full, host, width_px: stripe.width_px })
     }
 
-    /// Seconds of all pictures so many times over, on the chain that the command names.
+    /// Time in seconds of all pictures, `times` times, on the chain that the command names.
     fn timed(&mut self, command: &Command, times: usize) -> Result<serde_json::Value> {
         let (cpu, start) = (machine::cpu_seconds(), Instant::now());
         let points = match command {
@@ -226,7 +228,7 @@ impl Ours {
     }
 }
 
-/// The same on the processor.
+/// As [`run`], on the processor.
 fn run_host(host: &Host, images: &[Image], times: usize, at_once: bool) -> Result<usize> {
     let one = |image: &Image| Ok(host.run(0, image, &STILL)?.points.len());
     let mut points = 0;
@@ -240,7 +242,7 @@ fn run_host(host: &Host, images: &[Image], times: usize, at_once: bool) -> Resul
     Ok(points)
 }
 
-/// Runs all pictures; the number of points.
+/// Runs all pictures; returns the number of points.
 fn run(chain: &mut Chain, images: &[Image], times: usize) -> Result<usize> {
     let order: Vec<&Image> = (0..times).flat_map(|_| images).collect();
     let (mut points, mut done) = (0, Batch::default());

@@ -1,16 +1,16 @@
-//! In: nothing. Out: times of a shot that were measured on other machines, as benches/runs keeps them: what this one
-//! stands among.
+//! In: nothing. Out: times of a shot measured on other machines, as stored in benches/runs, for comparison with this
+//! machine.
 //! Frame and unit: ms a shot, one clean stripe.
 
 use super::ways::WayTime;
 
-/// Machine in words and what `sheetlight bench --json` said there.
+/// The machine in words, and the output of `sheetlight bench --json` on it.
 const RUNS: [(&str, &str); 2] = [
     ("two cores of a Xeon, software Vulkan", include_str!("../../benches/runs/2026-11-22-2core-xeon/bench.json")),
     ("NVIDIA H100", include_str!("../../benches/runs/2026-11-22-h100/bench.json")),
 ];
 
-/// What `way_times` measures, as far as it was recorded.
+/// The quantities that `way_times` measures, as far as they were recorded.
 pub fn recorded() -> Vec<WayTime> {
     #[derive(serde::Deserialize)]
     struct Row {

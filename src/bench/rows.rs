@@ -1,20 +1,20 @@
-//! In: nothing. Out: what a run of the bench comes to, row by row.
-//! Frame and unit: seconds, pixels, bytes; each field says.
+//! In: nothing. Out: the results of a bench run, row by row.
+//! Frame and unit: seconds, pixels, bytes; stated at each field.
 
 use super::scenes::Scene;
 
-/// GPU time of one stage, all its dispatches of a batch together, a shot.
+/// GPU time per shot of one stage, summed over all its dispatches of a batch.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Stage {
     /// The stage's label.
     pub name: String,
     /// Median of five batches, ms.
     pub ms_per_shot: f64,
-    /// How many a batch has.
+    /// Number of dispatches in a batch.
     pub dispatches: usize,
 }
 
-/// Time from handing over a single shot until its points are there, nothing else under way.
+/// Time from submitting a single shot until its points are available, with nothing else in flight.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Latency {
     /// Median, ms.
@@ -28,13 +28,13 @@ pub struct Latency {
 pub struct Soak {
     /// Shots that were run.
     pub shots: usize,
-    /// Resident after the first tenth, and at the end.
+    /// Resident after the first tenth of the run, 1e6 bytes.
     pub early_mb: f64,
     /// Resident at the end, 1e6 bytes.
     pub late_mb: f64,
 }
 
-/// One size and scene.
+/// Results of one size and scene.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Row {
     /// Columns, px.
@@ -43,47 +43,46 @@ pub struct Row {
     pub height: u32,
     /// What the pictures show.
     pub scene: Scene,
-    /// How many are submitted together.
+    /// Number of shots submitted together.
     pub shots_per_batch: u32,
-    /// How many were timed.
+    /// Number of shots timed.
     pub shots: usize,
     /// Wall time a shot, median over the batches in steady state.
     pub ms_per_shot: f64,
     /// The same with sub-pixel peaks, their sigma, their choice and their points in mm.
     pub full_ms_per_shot: Option<f64>,
-    /// That against the skeleton alone, median of runs in turns.
+    /// Ratio of that time to the time of the skeleton alone, median of alternating runs.
     pub full_over_skeleton: Option<f64>,
-    /// Wall time a shot with the pictures already where the stages read them, results brought back; and of the full
-    /// chain.
+    /// Wall time per shot, ms, with the pictures already where the stages read them; results are transferred back.
     pub device_ms_per_shot: f64,
     /// Wall time a shot of the full chain with the pictures already there, ms.
     pub full_device_ms_per_shot: Option<f64>,
-    /// In steady state, of `ms_per_shot`.
+    /// Shots a second in steady state, from `ms_per_shot`.
     pub shots_per_s: f64,
-    /// 1e6 pixels a second, of `ms_per_shot`.
+    /// 1e6 pixels a second, from `ms_per_shot`.
     pub mpx_per_s: f64,
-    /// CPU time of all threads a shot; on a software adapter the GPU's work is in it.
+    /// CPU time of all threads per shot; on a software adapter it includes the GPU's work.
     pub cpu_ms_per_shot: Option<f64>,
-    /// That, against one thread reading the same bytes once.
+    /// Ratio of that time to one thread reading the same bytes once.
     pub cpu_over_plain_read: Option<f64>,
-    /// Bytes that the stages move a pixel, from the buffers' sizes and the listed tiles.
+    /// Bytes that the stages move per pixel, from the buffers' sizes and the listed tiles.
     pub bytes_per_px: f64,
-    /// Share of the memory ceiling that is reached, of all threads, or of the device's own memory with the pictures
-    /// there; and of the upload ceiling.
+    /// Achieved share of the memory bandwidth: that of all threads, or that of the device's dedicated memory with
+    /// the pictures already there.
     pub share_of_memory: f64,
-    /// Share of the upload ceiling that is reached.
+    /// Achieved share of the upload bandwidth.
     pub share_of_upload: Option<f64>,
-    /// Points found a shot, mean.
+    /// Points found per shot, mean.
     pub points_per_shot: f64,
     /// Share of the tiles that could not be proven dark.
     pub listed: f64,
-    /// Of single shots.
+    /// Latency of single shots.
     pub latency: Latency,
-    /// All buffers of the chain, 1e6 bytes.
+    /// Size of all buffers of the chain, 1e6 bytes.
     pub gpu_memory_mb: f64,
-    /// Most that the process has held at once so far, 1e6 bytes; `None` where the system does not tell.
+    /// Most memory that the process has held at once so far, 1e6 bytes; `None` if the system does not report it.
     pub host_peak_mb: Option<f64>,
-    /// The long run, where one was asked for.
+    /// The long run, if one was requested.
     pub soak: Option<Soak>,
     /// GPU times, stage by stage in the order of the chain.
     pub stages: Vec<Stage>,

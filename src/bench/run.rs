@@ -1,5 +1,5 @@
-//! In: options. Out: one row a size and scene: time a shot, throughput, shares of the ceilings, latency,
-//! memory, stage times. Frame and unit: as the fields say.
+//! In: options. Out: one row for each size and scene: time a shot, throughput, shares of the bandwidth limits,
+//! latency, memory, stage times. Frame and unit: stated at the fields.
 
 use super::machine::{self, Ceilings};
 use super::rows::{Latency, Row, Soak, Stage};
@@ -18,18 +18,18 @@ use crate::stages::peak::{self, Stripe};
 use std::collections::VecDeque;
 use std::time::Instant;
 
-/// What is measured.
+/// Options of a bench run.
 #[derive(Clone, Debug)]
 pub struct BenchOptions {
     /// Picture sizes, px.
     pub sizes: Vec<(u32, u32)>,
-    /// What the pictures show; each is measured at every size.
+    /// Scenes; each is measured at every size.
     pub scenes: Vec<Scene>,
-    /// Seconds a row runs, 0.1..=600; longer is steadier.
+    /// Seconds per row, 0.1..=600; longer runs give steadier results.
     pub seconds: f64,
-    /// Shots of a long run of the full chain that is watched for growing memory, a row; 0 is none.
+    /// Shots per row of a long run of the full chain that is checked for growing memory; 0: no such run.
     pub soak: usize,
-    /// Measure pictures of one size with more and more lit pixels as well.
+    /// Also measure pictures of one size with an increasing share of bright pixels.
     pub lit_shares: bool,
 }
 
@@ -46,7 +46,7 @@ impl Default for BenchOptions {
 }
 
 impl BenchOptions {
-    /// Refuses `seconds` out of range, and no size or no scene.
+    /// Refuses `seconds` out of range, and empty lists of sizes or scenes.
     pub fn check(&self) -> Result<()> {
         if !(0.1..=600.0).contains(&self.seconds) {
             return Err(Fault::usage(format!("{} seconds a row, 0.1 to 600 are possible", self.seconds))
@@ -61,26 +61,26 @@ impl BenchOptions {
     }
 }
 
-/// Everything that one run of the bench tells.
+/// Results of one bench run.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Report {
-    /// Of this program.
+    /// Version of this program.
     pub version: &'static str,
     /// The device that was measured.
     pub adapter: AdapterInfo,
-    /// Threads that this machine offers.
+    /// Number of threads that this machine offers.
     pub threads: usize,
-    /// What memory and upload can carry.
+    /// Bandwidth limits of memory and upload.
     pub ceilings: Ceilings,
-    /// One a size and scene.
+    /// One row for each size and scene.
     pub rows: Vec<Row>,
-    /// How the time a shot grows with the pixels, for scenes of two sizes and more; and with the share of lit pixels.
+    /// Growth of the time per shot with the number of pixels, for scenes measured at two or more sizes.
     pub with_pixels: Vec<Scaling>,
-    /// How the time a shot grows with the share of lit pixels, where that was asked for.
+    /// Growth of the time per shot with the share of bright pixels, if requested.
     pub with_light: Option<Scaling>,
 }
 
-/// Measures on the given device. `progress` hears the row that begins.
+/// Measures on the given device. `progress` receives a description of each row when it begins.
 pub fn run(device: &Device, options: &BenchOptions, mut progress: impl FnMut(&str)) -> Result<Report> {
     options.check()?;
     let ceilings = Ceilings::measure(Some(device))?;
@@ -119,7 +119,7 @@ fn row(
         |n: usize| -> Vec<&Image> { (0..config.shots as usize).map(|i| refs[(n + i) % refs.len()]).collect() };
     let mut chain = Chain::new(device, &config)?;
     let gpu_memory = device.allocated_bytes() - before;
-    // Compiles every pipeline and touches every page.
+    // Compiles every pipeline and touches every memory page.
     for n in 0..3 {
         chain.submit(n, &batch_of(n as usize))?;
     }
@@ -129,8 +129,8 @@ fn row(
     let (cpu_ms, ms_per_shot) = (steady.cpu_ms_per_shot, steady.ms_per_shot);
     let device_ms_per_shot = resident(&mut chain, options.seconds / 4.0)?;
 
-    // The full chain in turns with the skeleton alone, so that both see the same machine. Every speck of a
-    // noise-heavy picture would be measured: that is no scan.
+    // The full chain runs in turns with the skeleton alone, so that both see the same machine conditions. It is
+    // skipped for the noise-heavy scene, where every speck would be measured, unlike in a scan.
     let full = if scene == Scene::NoiseHeavy {
         None
     } else {
@@ -147,7 +147,7 @@ fn row(
     let mpx = px / (ms_per_shot * 1e3);
     let share_of_memory = match ceilings.device_gb_s {
         None => 1e-3 * mpx * bytes_per_px / ceilings.read_all_gb_s,
-        // Not written by the stages, but by the upload.
+        // One byte per pixel is written by the upload, not by the stages.
         Some(own) => 1e-6 * px / device_ms_per_shot * (bytes_per_px - 1.0) / own,
     };
     Ok(Row {
@@ -178,7 +178,7 @@ fn row(
     })
 }
 
-/// Of one shot after the other with nothing else under way, for so many seconds.
+/// Latency of single shots with nothing else in flight, measured for `seconds`.
 fn latency(device: &Device, config: &ChainConfig, images: &[&Image], seconds: f64) -> Result<Latency> {
     let mut single = Chain::new(device, &ChainConfig { shots: 1, slots: 1, ..config.clone() })?;
     single.submit(0, &images[..1])?;
@@ -194,14 +194,14 @@ fn latency(device: &Device, config: &ChainConfig, images: &[&Image], seconds: f6
     Ok(Latency { p50_ms: percentile(&mut waits.clone(), 0.5), p99_ms: percentile(&mut waits, 0.99) })
 }
 
-/// Bytes that the stages move through memory a pixel, where this share of the tiles is listed.
+/// Bytes per pixel that the stages move through memory if this share of the tiles is listed.
 fn bytes_per_px(listed: f64) -> f64 {
-    // Written at upload, read once by the statistics; 32 bytes a tile of them written and read by 3 x 5 blocks
-    // out of the cache; a listed tile's surroundings and masks.
+    // Per pixel: written at upload, read once by the statistics. Per tile: 32 bytes of statistics, written, and read
+    // by 3 x 5 blocks from the cache. Per listed tile: its surroundings and masks.
     2.0 + 64.0 / 256.0 + listed * (62.0 * 38.0 / 256.0 + 1.0)
 }
 
-/// Time a shot, ms, of the pictures that lie in the ring's places since a run before, every place busy.
+/// Time per shot, ms, for pictures that are in the ring's slots from an earlier run, with every slot busy.
 fn resident(chain: &mut Chain, seconds: f64) -> Result<f64> {
     let shots = chain.frame.shots;
     let (mut per_batch, mut batch) = (Vec::new(), Batch::default());
@@ -219,7 +219,7 @@ fn resident(chain: &mut Chain, seconds: f64) -> Result<f64> {
     Ok(percentile(&mut per_batch, 0.5) / f64::from(shots))
 }
 
-/// What `scan` would run on pictures of a scene whose dark pixels scatter by `noise` grey levels.
+/// The settings that `scan` would use for pictures of a scene whose dark pixels scatter by `noise` grey levels.
 pub fn scan_chain(width: u32, height: u32, scene: Scene, noise: f32) -> ChainConfig {
     let width_px = scene.width_px();
     let stripe = Stripe { width_px, speckle: PeakParams::default().speckle, noise, ..Stripe::default() };
@@ -227,14 +227,14 @@ pub fn scan_chain(width: u32, height: u32, scene: Scene, noise: f32) -> ChainCon
     Extraction::default().for_stripe(&stripe).chain(Format { width, height, bits: 8 }, optics, width_px)
 }
 
-/// The chain with peaks, their choice and points, with the settings of a scan, and poses for a batch.
+/// The chain with peaks, their selection and points, with the settings of a scan; and poses for a batch.
 fn full(device: &Device, config: &ChainConfig, scene: Scene, image: &Image) -> Result<(Chain, Vec<[f32; 12]>)> {
     let scan = scan_chain(config.width, config.height, scene, peak::noise(image));
     let chain = Chain::new(device, &ChainConfig { shots: config.shots, slots: config.slots, ..scan })?;
     Ok((chain, (0..config.shots).map(cases::pose).collect()))
 }
 
-/// What the full chain takes.
+/// Times of the full chain.
 #[derive(Clone, Copy)]
 struct Full {
     ms_per_shot: f64,
@@ -242,7 +242,7 @@ struct Full {
     device_ms_per_shot: f64,
 }
 
-/// Time a shot of the full chain, and its ratio to the skeleton alone, in five turns.
+/// Time per shot of the full chain, and its ratio to the skeleton alone, in five turns.
 fn full_chain<'a>(
     device: &Device,
     config: &ChainConfig,
@@ -267,7 +267,7 @@ fn full_chain<'a>(
     })
 }
 
-/// Runs the full chain for so many shots and asks the system what the process holds.
+/// Runs the full chain for this many shots and reads the memory of the process.
 fn soak<'a>(
     device: &Device,
     config: &ChainConfig,

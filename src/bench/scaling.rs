@@ -1,6 +1,6 @@
-//! In: times a shot at several picture sizes, and pictures with more and more lit pixels. Out: what a shot costs by
-//! itself and what every further pixel, or lit pixel, adds. Frame and unit: ms a shot, megapixels, per cent of the
-//! pixels.
+//! In: times per shot at several picture sizes, and pictures with increasing shares of bright pixels. Out: the
+//! constant time per shot, and the time per further pixel or bright pixel. Frame and unit: ms a shot, megapixels,
+//! per cent of the pixels.
 
 use super::rows::Row;
 use super::scenes::{Scene, noisy};
@@ -11,32 +11,32 @@ use crate::raster::Image;
 use crate::stages::chain::batches::Chain;
 use crate::stages::chain::config::ChainConfig;
 
-/// A line through times: `intercept_ms + slope_ms x`, and how far from it they lie.
+/// A line through times: `intercept_ms + slope_ms x`, with the deviations from it.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Scaling {
-    /// What the line is about, in words.
+    /// Description of the line, in words.
     pub what: String,
-    /// What x counts, and the values of it that were measured.
+    /// Unit of x.
     pub unit: &'static str,
     /// Smallest measured x, in `unit`.
     pub from: f64,
     /// Largest measured x, in `unit`.
     pub to: f64,
-    /// ms a shot that one `unit` more adds.
+    /// Slope, ms a shot per `unit`.
     pub slope_ms: f64,
-    /// ms a shot at x = 0.
+    /// Time per shot at x = 0, ms.
     pub intercept_ms: f64,
-    /// Smallest and largest measured time over the line's: a cliff shows here.
+    /// Smallest ratio of a measured time to the line's; sudden jumps show here.
     pub lowest: f64,
-    /// Largest measured time over the line's.
+    /// Largest ratio of a measured time to the line's.
     pub highest: f64,
 }
 
 impl Scaling {
-    /// Least squares of the relative deviations, so that short times count as much as long ones. `None` where the
-    /// values of x are fewer than two.
+    /// Least squares of the relative deviations, so that short times count as much as long ones. `None` for fewer
+    /// than two values of x.
     fn fit(what: String, unit: &'static str, points: &[(f64, f64)]) -> Option<Scaling> {
-        // Of 1 = a / y + b x / y.
+        // Fit of 1 = a / y + b x / y.
         let (mut aa, mut ab, mut bb, mut a1, mut b1) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for &(x, y) in points {
             let (a, b) = (1.0 / y, x / y);
@@ -61,7 +61,7 @@ impl Scaling {
     }
 }
 
-/// Over the picture's size, a scene at a time.
+/// Lines over the picture's size, one for each scene.
 pub fn with_pixels(rows: &[Row]) -> Vec<Scaling> {
     let of = |scene: Scene| {
         let points: Vec<_> = rows
@@ -74,11 +74,11 @@ pub fn with_pixels(rows: &[Row]) -> Vec<Scaling> {
     Scene::ALL.into_iter().filter_map(of).collect()
 }
 
-/// Noise of these sigmas, grey levels, lights up 0.4 to 30 % of the pixels, stripe included.
+/// Noise sigmas, grey levels, that make 0.4 to 30 % of the pixels bright, including the stripe.
 const NOISE: [f64; 7] = [0.0, 2.5, 3.0, 4.0, 5.0, 7.0, 14.0];
 const SIZE: (u32, u32) = (1280, 960);
 
-/// Over the share of lit pixels, `seconds` a share: pictures of one size, a stripe in more and more noise.
+/// Line over the share of bright pixels, `seconds` per share: pictures of one size, a stripe in increasing noise.
 pub fn with_light(device: &Device, seconds: f64) -> Result<Scaling> {
     let config = ChainConfig { threshold: THRESHOLD, ..ChainConfig::new(SIZE.0, SIZE.1, 8).on(device) };
     let mut points = Vec::new();
@@ -86,7 +86,7 @@ pub fn with_light(device: &Device, seconds: f64) -> Result<Scaling> {
         let images: Vec<Image> = (0..u64::from(config.shots)).map(|seed| noisy(SIZE.0, SIZE.1, noise, seed)).collect();
         let batch: Vec<&Image> = images.iter().collect();
         let mut chain = Chain::new(device, &config)?;
-        // Compiles, and tells how many pixels are lit.
+        // Compiles the chain, and gives the number of bright pixels.
         chain.submit(0, &batch)?;
         chain.collect(true)?;
         let lit = 100.0 * chain.lit(0)?.count() as f64 / f64::from(SIZE.0 * SIZE.1);

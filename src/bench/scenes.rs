@@ -1,4 +1,4 @@
-//! In: a size and the name of a scene. Out: pictures of it, the same on every machine.
+//! In: a size and the name of a scene. Out: pictures of the scene, identical on every machine.
 //! Frame and unit: pixels, grey levels.
 
 use crate::raster::Image;
@@ -7,7 +7,7 @@ use crate::stages::noise::Noise;
 use crate::stages::stripe::point::Optics;
 use glam::Vec3Swizzles;
 
-/// What the pictures show.
+/// Contents of the pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scene {
@@ -15,18 +15,18 @@ pub enum Scene {
     OneStripe,
     /// The same, sigma 6 px.
     ThickStripe,
-    /// As `OneStripe` and `ThickStripe`, seen by a camera that is turned by 90 degrees.
+    /// As `OneStripe`, seen by a camera that is turned by 90 degrees.
     UprightStripe,
     /// As `ThickStripe`, seen by a camera that is turned by 90 degrees.
     UprightThick,
-    /// A stripe in noise so dense that a tenth of all pixels is lit.
+    /// A stripe in noise so dense that a tenth of all pixels is bright.
     NoiseHeavy,
     /// A stripe and 60 bright spots.
     ReflectionHeavy,
 }
 
 impl Scene {
-    /// All of them.
+    /// All scenes.
     pub const ALL: [Scene; 6] = [
         Scene::OneStripe,
         Scene::ThickStripe,
@@ -35,7 +35,7 @@ impl Scene {
         Scene::NoiseHeavy,
         Scene::ReflectionHeavy,
     ];
-    /// For people.
+    /// Name in tables and messages.
     pub fn name(self) -> &'static str {
         match self {
             Scene::OneStripe => "one stripe",
@@ -50,7 +50,7 @@ impl Scene {
     pub fn width_px(self) -> f32 {
         if matches!(self, Scene::ThickStripe | Scene::UprightThick) { 6.0 } else { 2.5 }
     }
-    /// The rig that sees it.
+    /// Optics of the rig that sees the scene.
     pub fn optics(self, width: u32, height: u32) -> Optics {
         let lying = optics(width, height);
         let upright = matches!(self, Scene::UprightStripe | Scene::UprightThick);
@@ -68,13 +68,13 @@ pub fn pictures(scene: Scene, width: u32, height: u32, count: u32) -> Vec<Image>
                 drawn(width, height, 8, |x, y| u32::from(lying.get(y, x)))
             }
             Scene::ReflectionHeavy => stripe(width, height, 8, 2.5, 60, seed),
-            // An offset of 8 levels is passed by about a tenth of the pixels.
+            // About a tenth of the pixels exceeds an offset of 8 levels.
             Scene::NoiseHeavy => noisy(width, height, 7.0, seed),
         })
         .collect()
 }
 
-/// A stripe in noise of so many grey levels, 1 sigma.
+/// A stripe in noise of `sigma` grey levels, 1 sigma.
 pub fn noisy(width: u32, height: u32, sigma: f64, seed: u64) -> Image {
     let clean = stripe(width, height, 8, 2.5, 3, seed);
     let mut noise = Noise(seed + 100);

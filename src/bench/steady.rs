@@ -1,4 +1,4 @@
-//! In: a chain and pictures. Out: how long it takes once it runs steadily.
+//! In: a chain and pictures. Out: its times in steady state.
 //! Frame and unit: seconds.
 
 use super::machine;
@@ -17,17 +17,17 @@ pub(super) fn percentile(times: &mut [f64], p: f64) -> f64 {
     1e3 * times[((times.len() - 1) as f64 * p).round() as usize]
 }
 
-/// What a run in steady state gave.
+/// Results of a run in steady state.
 pub(super) struct Steady {
     pub shots: usize,
     pub ms_per_shot: f64,
     pub cpu_ms_per_shot: Option<f64>,
-    /// Skeleton pixels a shot, listed tiles a batch.
+    /// Skeleton pixels per shot.
     pub points: f64,
     pub listed: f64,
 }
 
-/// Keeps every place of the ring busy for so many seconds.
+/// Keeps every slot of the ring busy for `seconds`.
 pub(super) fn steady<'a>(
     chain: &mut Chain,
     seconds: f64,

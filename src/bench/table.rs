@@ -1,10 +1,10 @@
-//! In: a report. Out: the table of it that a person reads.
-//! Frame and unit: as the columns say.
+//! In: a report. Out: a readable table of it.
+//! Frame and unit: stated in the columns.
 
 use super::rows::Row;
 use super::run::Report;
 
-/// The report as a table that a person reads.
+/// The report as a readable table.
 pub fn table(report: &Report) -> String {
     use std::fmt::Write;
     let mut out = machine(report);
@@ -41,7 +41,7 @@ pub fn table(report: &Report) -> String {
     out
 }
 
-/// What was measured on, and what it can carry.
+/// The machine and its bandwidth limits.
 fn machine(report: &Report) -> String {
     let (a, c) = (&report.adapter, &report.ceilings);
     format!(
@@ -59,7 +59,7 @@ fn machine(report: &Report) -> String {
     )
 }
 
-/// Their names over the columns of [`row`].
+/// The heads of the columns of [`row`].
 fn columns() -> String {
     format!(
         "{:11} {:16} {:>5} {:>8} {:>8} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>7} {:>7} {:>7} {:>8} {:>8}\n",

@@ -1,5 +1,5 @@
-//! In: a device, if there is one. Out: the time of a shot through the whole chain, as `scan` runs it, on this machine's
-//! processor and on the device, in turns. Frame and unit: ms a shot, median of the turns.
+//! In: a device, if there is one. Out: the time of a shot through the whole chain, as `scan` runs it, measured in
+//! turns on this machine's processor and on the device. Frame and unit: ms a shot, median of the turns.
 
 use super::machine;
 use super::run::scan_chain;
@@ -15,7 +15,7 @@ use crate::stages::host::Host;
 use rayon::prelude::*;
 use std::time::Instant;
 
-/// One way through the chain.
+/// The time of the chain on one processor or device.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct WayTime {
     /// The processor with its number of threads, or the device's name.
@@ -26,15 +26,15 @@ pub struct WayTime {
     pub height: u32,
     /// Wall time, median of the turns.
     pub ms_per_shot: f64,
-    /// Of all threads; on a software adapter the GPU's work is in it.
+    /// CPU time of all threads; on a software adapter it includes the GPU's work.
     pub cpu_ms_per_shot: Option<f64>,
 }
 
-/// A picture, the same at twice the resolution, and a large one.
+/// A picture size, the same view at twice the resolution, and a large one.
 pub(super) const SIZES: [(u32, u32); 3] = [(640, 480), (1280, 960), (2048, 1536)];
 const TURNS: usize = 5;
 
-/// Both ways at three sizes, one clean stripe.
+/// Times of both at three sizes, one clean stripe.
 pub fn way_times(device: Option<&Device>) -> Result<Vec<WayTime>> {
     let mut found = Vec::new();
     for (width, height) in SIZES {
@@ -50,7 +50,7 @@ pub fn way_times(device: Option<&Device>) -> Result<Vec<WayTime>> {
         let names = std::iter::once(name).chain(device.map(|d| d.info.name.clone()));
         for (way, on) in names.enumerate() {
             let (mut walls, mut cpus) = (Vec::new(), Vec::new());
-            // The first turn compiles and touches everything.
+            // The first turn compiles and touches all memory.
             for turn in 0..=TURNS {
                 let (cpu, start) = (machine::cpu_seconds(), Instant::now());
                 match &mut chain {

@@ -1,4 +1,4 @@
-//! In: messages with topic and time. Out: an MCAP file of profile ros2 that holds them, with its index.
+//! In: messages with topic and time. Out: an MCAP file of profile ros2 with these messages and their index.
 //! Frame and unit: none.
 
 use super::cdr::Cdr;
@@ -13,29 +13,29 @@ use std::fs::File;
 use std::io::{BufWriter, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// What messages are about.
+/// Topics of the messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Topic {
-    /// A shot's points.
+    /// Points of a shot.
     Profile,
     /// All points.
     Cloud,
-    /// Where frames were at a shot.
+    /// Poses of the frames at a shot.
     Transforms,
-    /// Where frames always are.
+    /// Poses of frames that never change.
     Static,
-    /// A shot's picture.
+    /// Picture of a shot.
     Picture,
-    /// Its camera.
+    /// Camera of a picture.
     CameraInfo,
-    /// A part that was found.
+    /// Pose of a found part.
     Part,
-    /// The scan's figures.
+    /// Figures of the scan.
     Diagnostics,
 }
 
 impl Topic {
-    /// As subscribers name it.
+    /// Name for subscribers.
     pub fn name(self) -> &'static str {
         match self {
             Topic::Profile => "/sheetlight/profile",
@@ -49,7 +49,7 @@ impl Topic {
         }
     }
 
-    /// Of its messages.
+    /// Kind of its messages.
     pub fn kind(self) -> Kind {
         match self {
             Topic::Profile | Topic::Cloud => Kind::PointCloud,
@@ -61,8 +61,8 @@ impl Topic {
         }
     }
 
-    /// What a player of bags offers to subscribers, by the numbers of ROS 2's middleware: everything is kept in order
-    /// (reliable), and what is said once reaches those that come later (durability 1, transient local).
+    /// Settings with which a player of bags offers the topic, in the numbers of ROS 2's middleware. All messages are
+    /// kept in order (reliable), and those sent once also reach later subscribers (durability 1, transient local).
     fn quality_of_service(self) -> String {
         let (depth, durability) = match self {
             Topic::Static | Topic::Cloud | Topic::Part | Topic::Diagnostics => (1, 1),
@@ -77,7 +77,7 @@ impl Topic {
     }
 }
 
-/// Bytes of messages after which a chunk is closed: what a reader takes in at a time.
+/// Size of messages, bytes, after which a chunk is closed: a reader loads one chunk at a time.
 const CHUNK: u64 = 4 << 20;
 
 /// A topic in the file.
@@ -86,7 +86,7 @@ struct Channel {
     messages: u32,
 }
 
-/// The file while it is written. Its messages go to the disk as they come; chunks are not compressed.
+/// The file during writing. Messages are written to the disk as they come; chunks are not compressed.
 pub struct Bag<'a> {
     path: PathBuf,
     writer: Writer<BufWriter<&'a File>>,
@@ -94,10 +94,10 @@ pub struct Bag<'a> {
 }
 
 impl<'a> Bag<'a> {
-    /// Begins a file; `path` is what errors call it.
+    /// Begins a file; `path` is its name in errors.
     ///
     /// # Errors
-    /// It cannot be written, which is what every other function here fails by.
+    /// The file cannot be written. The other functions here fail only for this reason.
     pub fn new(file: &'a File, path: &Path) -> Result<Bag<'a>> {
         let options = WriteOptions::new()
             .compression(None)
@@ -108,7 +108,7 @@ impl<'a> Bag<'a> {
         Ok(Bag { path: path.to_owned(), writer, channels: BTreeMap::new() })
     }
 
-    /// Adds a record of texts.
+    /// Adds a metadata record of texts.
     pub fn metadata(&mut self, name: &str, texts: BTreeMap<String, String>) -> Result<()> {
         let record = Metadata { name: name.to_owned(), metadata: texts };
         self.writer.write_metadata(&record).map_err(|e| fault(&self.path, e))
@@ -125,7 +125,7 @@ impl<'a> Bag<'a> {
         Ok(self.channels.get_mut(&topic).expect("just added"))
     }
 
-    /// Adds a message; its time is that of the log too.
+    /// Adds a message; its time is also the log time.
     pub fn write(&mut self, topic: Topic, at: Stamp, message: &Cdr) -> Result<()> {
         let path = self.path.clone();
         let channel = self.channel(topic).map_err(|e| fault(&path, e))?;
@@ -144,7 +144,7 @@ impl<'a> Bag<'a> {
     }
 }
 
-/// What the disk said is the cause, however deep it is wrapped.
+/// Takes the operating system's error as the cause, however deep it is wrapped.
 fn fault(path: &Path, error: McapError) -> Fault {
     let McapError::Io(error) = error else {
         return Fault::output(format!("{}: cannot be written: {error}", path.display()))

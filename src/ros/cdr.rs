@@ -1,12 +1,12 @@
 //! In: numbers, texts and bytes in the order of a message's fields. Out: the message as ROS 2 writes it: CDR of XCDR
-//! version 1, little endian, behind its header of four bytes.
+//! version 1, little endian, preceded by its header of four bytes.
 //! Frame and unit: none.
 
-/// Representation identifier of little-endian CDR, then two bytes of options.
+/// Representation identifier of little-endian CDR, followed by two bytes of options.
 const HEADER: [u8; 4] = [0, 1, 0, 0];
 
-/// A message that is being written. Every number is aligned to its own size, counted from behind the header.
-/// [OMG DDS-XTypes 1.3, 7.4.1; OMG DDSI-RTPS 2.5, 10.2]
+/// A message under construction. Every number is aligned to its own size, counted from the end of the header. [OMG
+/// DDS-XTypes 1.3, 7.4.1; OMG DDSI-RTPS 2.5, 10.2]
 #[derive(Clone, Debug)]
 pub struct Cdr {
     bytes: Vec<u8>,
@@ -19,14 +19,14 @@ impl Default for Cdr {
 }
 
 impl Cdr {
-    /// An empty message with room for `bytes` more.
+    /// An empty message with capacity for `bytes` more.
     pub fn with_room(bytes: usize) -> Cdr {
         let mut message = Vec::with_capacity(HEADER.len() + bytes);
         message.extend(HEADER);
         Cdr { bytes: message }
     }
 
-    /// The whole message, its header included.
+    /// The whole message, including its header.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
@@ -62,20 +62,21 @@ impl Cdr {
         self.put(value.to_le_bytes());
     }
 
-    /// `float64[N]`: no length stands before it.
+    /// `float64[N]`: without a length before it.
     pub fn f64s(&mut self, values: &[f64]) {
         values.iter().for_each(|v| self.f64(*v));
     }
 
-    /// The number of elements of a sequence, which follow.
+    /// The number of elements of a sequence; the elements follow.
     ///
     /// # Panics
-    /// More than a `uint32` counts: what can be that long is refused before.
+    /// More elements than a `uint32` can count: callers refuse such lengths before.
     pub fn count(&mut self, elements: usize) {
         self.u32(u32::try_from(elements).expect("its caller has refused longer ones"));
     }
 
-    /// `string`: its length with the zero at its end, its bytes, the zero. A zero within ends it.
+    /// `string`: its length including the final zero byte, its bytes, the zero byte. The text is cut at a zero byte
+    /// within it.
     pub fn string(&mut self, text: &str) {
         let text = text.split('\0').next().unwrap_or_default();
         self.count(text.len() + 1);
@@ -83,7 +84,7 @@ impl Cdr {
         self.bytes.push(0);
     }
 
-    /// Elements of a `uint8[]` whose number was written by [`Cdr::count`].
+    /// Elements of a `uint8[]`; [`Cdr::count`] must have written their number before.
     pub fn raw(&mut self, bytes: &[u8]) {
         self.bytes.extend(bytes);
     }
@@ -93,7 +94,7 @@ impl Cdr {
 mod tests {
     use super::*;
 
-    /// What stands behind the header.
+    /// The bytes after the header.
     fn body(write: impl Fn(&mut Cdr)) -> Vec<u8> {
         let mut message = Cdr::default();
         write(&mut message);
@@ -112,13 +113,13 @@ mod tests {
         });
         #[rustfmt::skip]
         assert_eq!(bytes, [
-            7, 0, 0, 0,                // a byte, three to fill up to 4
+            7, 0, 0, 0,                // a byte, three padding bytes up to 4
             4, 3, 2, 1,                // at 4
-            1, 0, 0, 0, 0, 0, 0, 0,    // at 8, seven to fill up to 16
+            1, 0, 0, 0, 0, 0, 0, 0,    // at 8, seven padding bytes up to 16
             0, 0, 0, 0, 0, 0, 0, 0xc0, // at 16: -2
             255, 255, 255, 255,        // at 24
         ]);
-        // Eight bytes stand at once where eight are done: the header of four does not count.
+        // Eight bytes directly follow eight: the header of four does not count for the alignment.
         assert_eq!(body(|m| m.f64(1.0)), [0, 0, 0, 0, 0, 0, 0xf0, 0x3f]);
     }
 
@@ -136,20 +137,20 @@ mod tests {
         #[rustfmt::skip]
         assert_eq!(bytes, [
             5, 0, 0, 0, b'b', b'a', b's', b'e', 0,
-            0, 0, 0,                   // filled up to 12
+            0, 0, 0,                   // padding up to 12
             1, 0, 0, 0,
-            1, 0, 0, 0, 0,             // an empty text is its zero
-            0, 0, 0,                   // filled up to 24
+            1, 0, 0, 0, 0,             // an empty text is only its zero byte
+            0, 0, 0,                   // padding up to 24
             3, 0, 0, 0, 9, 8, 7,
-            0,                         // filled up to 32
+            0,                         // padding up to 32
             1, 0, 0, 0,
-            0, 0, 0, 0,                // filled up to 40
+            0, 0, 0, 0,                // padding up to 40
             0, 0, 0, 0, 0, 0, 0xf0, 0x3f,
         ]);
         assert_eq!(body(|m| m.string("a\0b")), [2, 0, 0, 0, b'a', 0]);
     }
 
-    /// A header of a message: 1.5 s, "map", then a number of four bytes.
+    /// A message header: 1.5 s, "map", then a number of four bytes.
     #[test]
     fn a_header_is_the_bytes_that_were_worked_out() {
         let bytes = body(|m| {

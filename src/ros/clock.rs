@@ -1,5 +1,5 @@
-//! In: when a scan's pictures were taken, as its recording states it, or nothing. Out: the time of every shot, and in
-//! words where it comes from.
+//! In: the times of a scan's pictures as its recording states them, or nothing. Out: the time of every shot, and the
+//! origin of the times in words.
 //! Frame and unit: ns since 1970 (UTC).
 
 use super::messages::Stamp;
@@ -7,40 +7,40 @@ use crate::fault::{Fault, Result};
 use crate::recording::Taken;
 use std::collections::BTreeMap;
 
-/// What the messages' times are, for a program to tell.
+/// Origin of the messages' times, for programs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, strum::Display)]
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
 pub enum Source {
-    /// Begin of the exposure, by the camera's clock.
+    /// Start of the exposure, by the camera's clock.
     Exposure,
-    /// Arrival of the picture, less its exposure.
+    /// Arrival of the picture, minus its exposure time.
     Arrival,
-    /// Made up: nothing states a time.
+    /// Artificial: no time is stated.
     Synthetic,
 }
 
 /// The times of a scan's shots.
 #[derive(Clone, Debug)]
 pub struct Clock {
-    /// What they are.
+    /// Origin of the times.
     pub source: Source,
-    /// The same in words, with the numbers that they rest on.
+    /// The origin in words, with the numbers that it depends on.
     pub words: String,
     taken: BTreeMap<u32, u64>,
     start: u64,
     step_ns: f64,
 }
 
-/// Seconds of a message are an `int32`.
+/// Latest time, ns: seconds of a message are an `int32`.
 const LATEST: u64 = i32::MAX as u64 * 1_000_000_000;
 
 impl Clock {
-    /// The clock that nobody had: shot 0 at `created` (RFC 3339), `rate_hz` shots a second. `why` says in words what
-    /// has no times.
+    /// An artificial clock: shot 0 at `created` (RFC 3339), `rate_hz` shots a second. `why` states the reason in
+    /// words.
     ///
     /// # Errors
-    /// A rate that is not between 0.001 and 100,000 per second; a text that is not a time.
+    /// A rate outside 0.001 to 100,000 per second; a text that is not a time.
     pub fn synthetic(created: &str, rate_hz: f64, why: &str) -> Result<Clock> {
         if !(1e-3..=1e5).contains(&rate_hz) {
             return Err(Fault::usage(format!("a rate of {rate_hz} shots per second, 0.001 to 100000 are possible"))
@@ -59,13 +59,14 @@ impl Clock {
         Ok(Clock { source: Source::Synthetic, words, taken: BTreeMap::new(), start, step_ns })
     }
 
-    /// The times that a recording states of shots, each with its number.
+    /// The times that a recording states for shots, each given with its index.
     ///
     /// # Errors
     /// There are no shots.
     pub fn recorded<'a>(shots: impl Iterator<Item = (u32, &'a Taken)> + Clone) -> Result<Clock> {
         let exposed = |t: &Taken| t.exposure_ns.unwrap_or(0);
-        // How much the host's clock is ahead of the camera's at most: no picture arrives before its exposure ends.
+        // Upper bound of the lead of the host's clock over the camera's: no picture arrives before its exposure
+        // ends.
         let ahead = |t: &Taken| Some(i128::from(t.host_ns) - i128::from(t.device_ns? + exposed(t)));
         let least =
             shots.clone().map(|(_, t)| ahead(t)).collect::<Option<Vec<_>>>().and_then(|all| all.into_iter().min());
@@ -97,10 +98,10 @@ impl Clock {
         Ok(Clock { source, words, taken, start, step_ns: 0.0 })
     }
 
-    /// When a shot was taken.
+    /// Time of a shot.
     ///
     /// # Errors
-    /// A time after January 2038, which the messages cannot hold; a shot of which the recording states none.
+    /// A time after January 2038, which the messages cannot hold; a shot without a time in the recording.
     pub fn at(&self, shot: u32) -> Result<Stamp> {
         let ns = match self.source {
             Source::Synthetic => self.start.saturating_add((f64::from(shot) * self.step_ns).round() as u64),
@@ -138,7 +139,8 @@ mod tests {
             (3, taken(Some(35_000), 1_031_000)),
         ];
         let clock = Clock::recorded(shots.iter().map(|(s, t)| (*s, t))).unwrap();
-        // Shot 0 arrived 994,000 ns after its exposure ended by the other clock, shot 2 1,004,000, shot 3 995,000.
+        // From the end of its exposure by the other clock, shot 0 took 994,000 ns to arrive, shot 2 1,004,000, shot
+        // 3 995,000.
         assert_eq!(clock.source, Source::Exposure);
         assert_eq!([0, 2, 3].map(|s| clock.at(s).unwrap().0), [999_000, 1_019_000, 1_029_000]);
         assert!(clock.words.contains("994000 ns"), "{}", clock.words);

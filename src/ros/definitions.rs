@@ -1,8 +1,8 @@
-//! In: a kind of message. Out: its name in ROS 2, and its definition with those that it rests on, as an MCAP file
-//! carries them.
-//! Frame and unit: as the messages' writers say.
+//! In: a kind of message. Out: its name in ROS 2, and its definition with those that it depends on, as an MCAP file
+//! contains them.
+//! Frame and unit: stated where the messages are written.
 
-/// The kinds of messages that are written.
+/// Kinds of messages that are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// Points with their fields.
@@ -95,7 +95,7 @@ impl Kind {
         }
     }
 
-    /// Its own fields, then every definition that it rests on behind a line that names it.
+    /// Its own fields, then every definition that it depends on, each after a line with its name.
     pub fn definition(self) -> String {
         let mut text = self.fields().to_owned();
         for (name, fields) in self.rests_on() {
@@ -109,7 +109,7 @@ impl Kind {
 mod tests {
     use super::*;
 
-    /// Every type that a definition names has its own below it, once.
+    /// Every type that a definition names has a definition below it, exactly once.
     #[test]
     fn a_definition_is_whole() {
         let all = [Kind::PointCloud, Kind::Transforms, Kind::Image, Kind::CameraInfo, Kind::Pose, Kind::Diagnostics];

@@ -1,6 +1,6 @@
-//! In: a finished scan, and where given its recording, its station and the parts found in it. Out: `scan.mcap`, whole
-//! or not there.
-//! Frame and unit: the cloud's frame, which messages name; mm become metres here.
+//! In: a finished scan, and if given its recording, its station and the parts found in it. Out: `scan.mcap`, either
+//! complete or absent.
+//! Frame and unit: the cloud's frame, which messages name; mm are converted to metres here.
 
 use super::bag::{Bag, Topic};
 use super::clock::{Clock, Source};
@@ -19,27 +19,27 @@ use crate::station::{ScanReport, rig_that_scanned, whole_scan};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What goes into the file.
+/// Options of an export.
 pub struct Export<'a> {
     /// Folder of the finished scan.
     pub scan: &'a Path,
-    /// File to be written; it must not be there.
+    /// File to be written; it must not exist.
     pub out: &'a Path,
     /// The recording that was scanned: times, flange poses, pictures.
     pub recording: Option<&'a Recording>,
-    /// Name of its pose file where meta.json names several.
+    /// Name of its pose file if meta.json names several.
     pub poses: Option<&'a str>,
-    /// The station that scanned: the camera on the flange, the camera of the pictures.
+    /// The station that scanned; it provides the pose of the camera on the flange, and the camera of the pictures.
     pub station: Option<&'a Path>,
-    /// Whether the recording's pictures go into the file.
+    /// Whether the recording's pictures are written into the file.
     pub pictures: bool,
-    /// Reports of parts that were found in the scan.
+    /// Reports of parts found in the scan.
     pub parts: &'a [PathBuf],
     /// Names of frames.
     pub frames: &'a Frames,
-    /// Shots per second where no recording states times.
+    /// Shots per second if no recording states times.
     pub rate_hz: f64,
-    /// Whether all points go into one message too.
+    /// Whether all points are also written as one message.
     pub cloud: bool,
 }
 
@@ -50,37 +50,37 @@ pub struct Written {
     pub topic: &'static str,
     /// Type of its messages.
     pub kind: &'static str,
-    /// How many there are.
+    /// Number of messages.
     pub messages: u32,
 }
 
-/// What was written.
+/// Result of an export.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Exported {
-    /// The file.
+    /// The written file.
     pub out: PathBuf,
-    /// Its length.
+    /// Size of the file, bytes.
     pub bytes: u64,
-    /// Points of all profiles.
+    /// Number of points in all profiles.
     pub points: u64,
-    /// The cloud's frame, as messages name it.
+    /// Name of the cloud's frame in messages.
     pub frame: String,
-    /// What the times are.
+    /// Origin of the times.
     pub times: Source,
-    /// Where they come from.
+    /// Origin of the times in words.
     pub times_from: String,
     /// First and last time, ns since 1970.
     pub span_ns: [u64; 2],
     /// Messages by topic.
     pub topics: Vec<Written>,
-    /// What the file lacks although it was asked for, one sentence each.
+    /// Requested contents that the file lacks, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// Name of the record that says what the file was made of.
+/// Name of the metadata record that states the file's origin.
 const RECORD: &str = "sheetlight";
 
-/// All that is read before the first byte is written.
+/// All inputs, read before the first byte is written.
 struct Input<'a> {
     report: ScanReport,
     shots: Shots,
@@ -91,15 +91,15 @@ struct Input<'a> {
     /// The camera of the recording's pictures.
     camera: Option<Intrinsics>,
     parts: Vec<FoundPart>,
-    /// The shot whose time is the scan's end.
+    /// The shot whose time is the end of the scan.
     last: u32,
 }
 
 /// Writes the file. `progress` is called with (points done, all points).
 ///
 /// # Errors
-/// A file that is there already or cannot be written; a scan without points or whose files are not those that it wrote;
-/// a recording, a station or a part of another scan; a lens that ROS has no words for.
+/// An existing output file, or one that cannot be written; a scan without points, or with files other than those
+/// that it wrote. Also a recording, a station or a part of another scan, and a lens that ROS cannot describe.
 pub fn export(e: &Export, progress: &mut dyn FnMut(u64, u64)) -> Result<Exported> {
     if e.out.symlink_metadata().is_ok() {
         return Err(Fault::usage(format!("{}: is there already", e.out.display()))
@@ -133,7 +133,7 @@ pub fn export(e: &Export, progress: &mut dyn FnMut(u64, u64)) -> Result<Exported
     })
 }
 
-/// Writes everything and the index. Returns the number of messages by topic.
+/// Writes all messages and the index. Returns the number of messages by topic.
 fn fill(
     mut bag: Bag,
     e: &Export,
@@ -165,7 +165,7 @@ impl<'a> Input<'a> {
     fn read(e: &Export<'a>) -> Result<Input<'a>> {
         let (report, shots, cloud) = whole_scan(e.scan)?;
         if e.cloud && cloud.count() > MOST_POINTS {
-            // Said before anything is written.
+            // Refused before anything is written.
             Points::new(Stamp(0), "", cloud.count())?;
         }
         let rig = e.station.map(|station| rig_that_scanned(station, e.scan, &report)).transpose()?;
@@ -190,7 +190,7 @@ impl<'a> Input<'a> {
         Ok(Input { report, shots, cloud, rig, recorded, clock, camera, parts, last })
     }
 
-    /// What the file says of itself.
+    /// Metadata that the file contains about itself.
     fn told(&self, e: &Export) -> BTreeMap<String, String> {
         let r = &self.report;
         let name = e.scan.canonicalize().ok().and_then(|p| Some(p.file_name()?.to_string_lossy().into_owned()));
@@ -213,12 +213,12 @@ impl<'a> Input<'a> {
         told
     }
 
-    /// The shots whose places are known, in order.
+    /// The shots with known poses, in order.
     fn places(&self) -> std::vec::IntoIter<u32> {
         self.shots.places().map(|(shot, _)| shot).collect::<Vec<_>>().into_iter()
     }
 
-    /// Links that never change.
+    /// Transforms that never change.
     fn fixed(&self, frames: &Frames) -> Vec<Link> {
         let mut links = Vec::new();
         if let Some(sheet) = &self.shots.sheet {
@@ -233,15 +233,15 @@ impl<'a> Input<'a> {
     }
 }
 
-/// The scan while it goes from the cloud's file into the bag, shot by shot.
+/// State of the transfer from the cloud's file into the bag, shot by shot.
 struct Flow<'a, 'b> {
     e: &'b Export<'a>,
     input: &'b Input<'a>,
     bag: Bag<'b>,
-    /// Shots whose transforms and pictures are still to come, in order.
+    /// Shots whose transforms and pictures are not yet written, in order.
     places: std::vec::IntoIter<u32>,
     whole: Option<Points>,
-    /// Points of the shot that is being read.
+    /// Points read so far of the current shot.
     profile: Vec<CloudPoint>,
     done: u64,
 }
@@ -287,7 +287,7 @@ impl Flow<'_, '_> {
             .next("scan again")
     }
 
-    /// Writes the points of the shot that was read, behind all that belongs to it and to the shots before.
+    /// Writes the points of the current shot, after the transforms and pictures of this shot and of those before it.
     fn profile(&mut self) -> Result<()> {
         let points = std::mem::take(&mut self.profile);
         let Some(shot) = points.first().map(|p| p.shot) else { return Ok(()) };
@@ -299,7 +299,7 @@ impl Flow<'_, '_> {
         let mut message = Points::new(at, self.e.frames.name(&self.input.report.frame), points.len() as u64)?;
         message.add(&points);
         self.bag.write(Topic::Profile, at, &message.finish())?;
-        // Its memory serves the next one.
+        // Reuse its memory for the next shot.
         self.profile = points;
         self.profile.clear();
         Ok(())

@@ -4,7 +4,7 @@
 use super::messages::Status;
 use crate::station::ScanReport;
 
-/// The figures of scan.json that tell how good a scan is; a warning where shots were skipped or something is remarked.
+/// The figures of scan.json that describe a scan's quality; a warning if shots were skipped or there are remarks.
 pub fn status(report: &ScanReport) -> Status {
     let mut values: Vec<(String, String)> = Vec::new();
     let mut add = |key: &str, value: String| values.push((key.to_owned(), value));

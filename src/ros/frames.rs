@@ -1,11 +1,11 @@
-//! In: names that a person gives to frames. Out: the names under which messages know them; the laser's frame.
-//! Frame and unit: camera frame, mm, of the laser's.
+//! In: the user's names for frames. Out: the names of frames in messages; the laser's frame.
+//! Frame and unit: camera frame, mm, for the laser's frame.
 
 use crate::geometry::{Camera, Mat3, Plane, Rigid, Sensor, Vec3};
 use crate::scan::Along;
 use std::collections::BTreeMap;
 
-/// The frames that messages name, under these names unless a person renames them.
+/// The frames that messages name; these names are used unless the user renames them.
 pub const FRAMES: [&str; 7] = ["base", "flange", "axis", "map", "camera", "camera_reported", "laser"];
 
 /// Names of frames.
@@ -14,7 +14,7 @@ pub struct Frames {
     renamed: BTreeMap<&'static str, String>,
 }
 
-/// A frame and the name that it gets: `base=base_link`.
+/// A frame and its new name: `base=base_link`.
 #[derive(Clone, Debug)]
 pub struct Renamed {
     frame: &'static str,
@@ -37,10 +37,10 @@ impl std::str::FromStr for Renamed {
 }
 
 impl Frames {
-    /// With these names; all others stay.
+    /// Frames with these names; all others keep theirs.
     ///
     /// # Errors
-    /// In words: one frame renamed twice, two frames of one name.
+    /// In words: a frame renamed twice, or two frames of the same name.
     pub fn new(renamed: &[Renamed]) -> Result<Frames, String> {
         let mut frames = Frames::default();
         for Renamed { frame, name } in renamed {
@@ -62,15 +62,16 @@ impl Frames {
     }
 }
 
-/// The laser's frame in the camera's: z along the sheet's normal, x along the stripe as far as it lies in the sheet,
-/// origin where the camera's axis meets the sheet.
+/// The laser's frame in the camera frame: z along the sheet's normal, x along the stripe as projected into the
+/// sheet, origin where the camera's axis meets the sheet.
 pub fn camera_from_laser(sheet: &Plane<Camera>, along: Along) -> Rigid<Camera, Sensor> {
     let z = sheet.normal;
     let stripe = if along == Along::U { Vec3::x() } else { Vec3::y() };
     let x = stripe - z * z.dot(&stripe);
-    // A stripe runs within its sheet; a sheet across it has no direction of its own.
+    // A stripe runs within its sheet. For a sheet across that direction, x is chosen arbitrarily.
     let x = x.try_normalize(1e-6).unwrap_or_else(|| z.cross(&Vec3::z()).normalize());
-    // A sheet along the axis never meets it: the foot of the camera's centre stands for that.
+    // A sheet parallel to the axis never meets it: then the foot of the perpendicular from the camera's centre is
+    // used.
     let origin = if z.z.abs() > 1e-3 { Vec3::z() * (sheet.offset / z.z) } else { z * sheet.offset };
     Rigid::new(Mat3::from_columns(&[x, z.cross(&x), z]), origin)
 }

@@ -1,5 +1,5 @@
-//! In: points, poses, pictures, cameras and figures of a scan, with frame and time. Out: the messages of ROS 2 that
-//! hold them.
+//! In: points, poses, pictures, cameras and figures of a scan, with frame and time. Out: the ROS 2 messages that
+//! contain them.
 //! Frame and unit: the frame that each message names; metres, in the messages and in a cloud's fields; pixels.
 
 use super::cdr::Cdr;
@@ -16,9 +16,9 @@ pub struct Stamp(pub u64);
 
 /// A transform from a frame to its parent.
 pub struct Link {
-    /// Name of the frame in which the child's origin and axes are stated.
+    /// Name of the frame in which the child's pose is stated.
     pub parent: String,
-    /// Name of the frame.
+    /// Name of the child frame.
     pub child: String,
     /// x y z, metres, and the quaternion x y z w.
     numbers: [f64; 7],
@@ -31,7 +31,7 @@ impl Link {
     }
 }
 
-/// Metres, and the quaternion with its real part last.
+/// Position in metres, and the quaternion with its real part last.
 fn numbers<To: Frame, From: Frame>(pose: &Rigid<To, From>) -> [f64; 7] {
     Convention::Ros.write(pose).try_into().expect("a position and a quaternion")
 }
@@ -62,7 +62,7 @@ pub fn pose<To: Frame, From: Frame>(at: Stamp, frame: &str, frame_from_part: &Ri
     m
 }
 
-/// Numbers of `sensor_msgs/msg/PointField`'s kinds.
+/// Numbers of the data types of `sensor_msgs/msg/PointField`.
 const UINT32: u8 = 6;
 const FLOAT32: u8 = 7;
 
@@ -79,10 +79,10 @@ const FIELDS: [(&str, u8); 9] = [
     ("shot", UINT32),
 ];
 
-/// Bytes of a point.
+/// Size of a point, bytes.
 const RECORD: usize = 4 * FIELDS.len();
 
-/// Points of one message: its lengths are counted in 32 bits.
+/// Most points of one message, because its lengths are counted in 32 bits.
 pub const MOST_POINTS: u64 = u32::MAX as u64 / RECORD as u64;
 
 fn record(p: &CloudPoint) -> [u8; RECORD] {
@@ -96,14 +96,14 @@ fn record(p: &CloudPoint) -> [u8; RECORD] {
     bytes
 }
 
-/// `sensor_msgs/msg/PointCloud2` whose points are added one after the other: none but the message itself is in memory.
+/// `sensor_msgs/msg/PointCloud2` whose points are added one after the other: only the message itself is in memory.
 pub struct Points {
     message: Cdr,
     left: usize,
 }
 
 impl Points {
-    /// A message of `count` points, not organised.
+    /// An unorganised message of `count` points.
     ///
     /// # Errors
     /// More than [`MOST_POINTS`].
@@ -138,7 +138,7 @@ impl Points {
         points.iter().for_each(|p| self.message.raw(&record(p)));
     }
 
-    /// The message, after all of its points. None of them is missing or not a number (`is_dense`).
+    /// The message, after all its points were added. No point is missing or NaN (`is_dense`).
     pub fn finish(mut self) -> Cdr {
         assert_eq!(self.left, 0, "all points that were announced");
         self.message.bool(true);
@@ -146,7 +146,7 @@ impl Points {
     }
 }
 
-/// `sensor_msgs/msg/Image`: mono8, or mono16 (little endian) with the levels as they are, not stretched to 16 bits.
+/// `sensor_msgs/msg/Image`: mono8, or mono16 (little endian) with unchanged levels, not stretched to 16 bits.
 pub fn image(at: Stamp, frame: &str, picture: &Image) -> Cdr {
     let (encoding, size) = if picture.bits > 8 { ("mono16", 2) } else { ("mono8", 1) };
     let bytes = picture.pixel_count() * size;
@@ -160,16 +160,16 @@ pub fn image(at: Stamp, frame: &str, picture: &Image) -> Cdr {
     m.count(bytes);
     match &picture.pixels {
         Pixels::U8(levels) => m.raw(levels),
-        // Little endian, as every machine that this program runs on.
+        // Little endian, like every machine that this program runs on.
         Pixels::U16(levels) => m.raw(bytemuck::cast_slice(levels)),
     }
     m
 }
 
-/// The lens as ROS names it, with its terms.
+/// ROS' name of the lens model, with its terms.
 ///
 /// # Errors
-/// A thin prism or a tilted sensor, for which ROS has no words.
+/// A thin prism or a tilted sensor, which ROS cannot describe.
 pub fn lens(camera: &Intrinsics) -> Result<(&'static str, &[f64])> {
     match camera.distortion.to_opencv() {
         terms if terms.len() == 5 => Ok(("plumb_bob", terms)),
@@ -180,7 +180,7 @@ pub fn lens(camera: &Intrinsics) -> Result<(&'static str, &[f64])> {
     }
 }
 
-/// `sensor_msgs/msg/CameraInfo` of pictures of the camera's size; [`lens`] has accepted it.
+/// `sensor_msgs/msg/CameraInfo` of pictures of the camera's size; fails as [`lens`] does.
 pub fn camera_info(at: Stamp, frame: &str, camera: &Intrinsics) -> Result<Cdr> {
     let (model, terms) = lens(camera)?;
     let Intrinsics { fx, fy, cx, cy, skew, .. } = *camera;
@@ -194,7 +194,7 @@ pub fn camera_info(at: Stamp, frame: &str, camera: &Intrinsics) -> Result<Cdr> {
     m.f64s(&[fx, skew, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]);
     m.f64s(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
     m.f64s(&[fx, skew, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]);
-    // Binning and region are in the matrix already.
+    // Binning and region are included in the matrix already.
     [0; 6].into_iter().for_each(|n| m.u32(n));
     m.bool(false);
     Ok(m)
@@ -202,15 +202,15 @@ pub fn camera_info(at: Stamp, frame: &str, camera: &Intrinsics) -> Result<Cdr> {
 
 /// One status of `diagnostic_msgs/msg/DiagnosticArray`.
 pub struct Status {
-    /// Whether somebody should look at it.
+    /// Whether the status is a warning.
     pub warn: bool,
-    /// What it is of.
+    /// Name of the component that it describes.
     pub name: String,
-    /// In one line.
+    /// Summary in one line.
     pub message: String,
-    /// The station, by its calibration.
+    /// The station, identified by its calibration.
     pub hardware: String,
-    /// Figures, the unit in the name.
+    /// Figures with the unit in the name.
     pub values: Vec<(String, String)>,
 }
 
@@ -262,11 +262,12 @@ mod tests {
         let bytes = points.finish().bytes().to_vec();
         let mut expected: Vec<u8> = vec![0, 1, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 4, 0, 0, 0, b'm', b'a', b'p', 0];
         expected.extend([1, 0, 0, 0, 1, 0, 0, 0, 9, 0, 0, 0]);
-        // x: the text takes 6 bytes and 2 to fill up; offset, kind, 3 to fill up, count.
+        // x: the text takes 6 bytes and 2 padding bytes; offset, type, 3 padding bytes, count.
         expected.extend([2, 0, 0, 0, b'x', 0, 0, 0, 0, 0, 0, 0, 7, 0, 0, 0, 1, 0, 0, 0]);
         expected.extend([2, 0, 0, 0, b'y', 0, 0, 0, 4, 0, 0, 0, 7, 0, 0, 0, 1, 0, 0, 0]);
         assert_eq!(bytes[..expected.len()], expected);
-        // bool at a multiple of 4 behind the last field's count; point_step, row_step, bytes of data, data, is_dense.
+        // The bool is padded to a multiple of 4 after the last field's count; point_step, row_step, size of data,
+        // data, is_dense.
         let tail = [[0, 0, 0, 0], [36, 0, 0, 0], [36, 0, 0, 0], [36, 0, 0, 0]].concat();
         let end = bytes.len() - 37;
         assert_eq!(bytes[end - 16..end], tail);

@@ -1,5 +1,5 @@
-//! In: a finished scan, and where given its recording, its station and the parts found in it. Out: an MCAP file with
-//! messages of ROS 2, made without ROS.
+//! In: a finished scan, and if given its recording, its station and the parts found in it. Out: an MCAP file with
+//! ROS 2 messages, made without ROS.
 //! Frame and unit: frames of docs/connections.md; metres in the file.
 
 mod bag;

@@ -1,11 +1,11 @@
-//! In: the report of a part that was found. Out: its pose.
+//! In: the report of a found part. Out: its pose.
 //! Frame and unit: the frame that the report names, mm.
 
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Part, Rigid};
 use std::path::Path;
 
-/// What is taken of a report; `find` writes more into it.
+/// The fields that are read from a report; `find` writes more.
 #[derive(serde::Deserialize)]
 pub struct FoundPart {
     /// Name of the recipe.
@@ -13,15 +13,15 @@ pub struct FoundPart {
     frame: String,
     passed: bool,
     reasons: Vec<String>,
-    /// The part's frame in the scan's, mm.
+    /// Pose of the part in the scan's frame, mm.
     pub base_from_part: Rigid<Base, Part>,
 }
 
 impl FoundPart {
-    /// Reads the report (JSON) of a part that was found in a scan of this frame.
+    /// Reads the report (JSON) of a part found in a scan of this frame.
     ///
     /// # Errors
-    /// Another file, a pose that missed a gate, a pose in another frame.
+    /// A file of another kind, a pose that failed a gate, a pose in another frame.
     pub fn load(path: &Path, frame: &str) -> Result<FoundPart> {
         let found: FoundPart = serde_json::from_str(&crate::files::read_text(path)?).map_err(|e| {
             Fault::input(format!("{}: is not the report of a part that was found: {e}", path.display()))

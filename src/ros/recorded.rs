@@ -1,5 +1,5 @@
-//! In: a recording, and a finished scan that may be of it. Out: the recording's pictures, times and flange poses by the
-//! scan's shots; a recording of another scan is refused.
+//! In: a recording, and a finished scan that may belong to it. Out: the recording's pictures, times and flange poses
+//! by the scan's shots; a recording of another scan is refused.
 //! Frame and unit: base_from_flange, mm; ns.
 
 use super::clock::Clock;
@@ -20,15 +20,15 @@ pub struct Recorded<'a> {
     flanges: BTreeMap<u32, Rigid<Base, Flange>>,
 }
 
-/// Farther than this from where the scan has the camera, rad and mm, a recording's pose is another one's: straightened
-/// paths and delays stay far below it.
+/// Largest deviation from the scan's camera pose, rad and mm. A larger one means another recording; the corrections
+/// of paths and delays stay far below it.
 const OTHER: [f64; 2] = [0.035, 5.0];
 
 impl<'a> Recorded<'a> {
-    /// `poses` names the file of a robot's poses where meta.json does not; `rig` is the one that scanned.
+    /// `poses` names the file of a robot's poses if meta.json does not; `rig` is the rig that scanned.
     ///
     /// # Errors
-    /// A recording that is not this scan's: other pictures, fewer shots, another motion, poses that lead elsewhere.
+    /// A recording that does not belong to this scan: other pictures, fewer shots, another motion, deviating poses.
     pub fn new(
         recording: &'a Recording,
         poses: Option<&str>,
@@ -71,17 +71,17 @@ impl<'a> Recorded<'a> {
         self.frames.get(shot as usize).map(|i| &self.recording.meta.frames[*i])
     }
 
-    /// Where the robot's flange was reported at a shot; none of an axis.
+    /// Reported pose of the robot's flange at a shot; none for an axis.
     pub fn flange(&self, shot: u32) -> Option<&Rigid<Base, Flange>> {
         self.flanges.get(&shot)
     }
 
-    /// The picture of a shot, its levels made linear as for the scan.
+    /// The picture of a shot, with its levels made linear as in the scan.
     pub fn picture(&self, shot: u32) -> Result<Option<Image>> {
         self.frame(shot).and_then(|f| f.laser.as_ref()).map(|name| self.recording.picture(name)).transpose()
     }
 
-    /// The times of these shots. The error says in words why the recording gives none.
+    /// The times of these shots. The inner error states in words why the recording has none.
     pub fn clock(&self, shots: &[u32]) -> Result<std::result::Result<Clock, String>> {
         let taken = |shot: &u32| Some((*shot, self.frame(*shot)?.taken.as_ref()?));
         let without: Vec<u32> = shots.iter().copied().filter(|s| taken(s).is_none()).collect();
@@ -97,7 +97,7 @@ impl<'a> Recorded<'a> {
     }
 }
 
-/// Where what moves stood at every shot; shots of an axis without a count are missing.
+/// Position of what moves at every shot; an axis' shots without a count are missing.
 fn stands(recording: &Recording, poses: Option<&str>, frames: &[usize]) -> Result<BTreeMap<u32, Stand>> {
     let numbered = || (0..).zip(frames.iter().copied());
     if recording.meta.motion().axis().is_some() {
@@ -109,8 +109,9 @@ fn stands(recording: &Recording, poses: Option<&str>, frames: &[usize]) -> Resul
     numbered().map(stand).collect()
 }
 
-/// In words how far the recording's poses lead away from where the scan has the camera. With the rig that scanned every
-/// motion is compared; without it a robot's poses must have the camera at one place of what they move.
+/// Compares the recording's poses with the scan's camera poses; an error states the deviation in words. With the rig
+/// that scanned, every motion is compared. Without it, a robot's poses must give the same pose of the camera
+/// relative to what they move.
 fn check(
     stands: &BTreeMap<u32, Stand>,
     shots: &Shots,
@@ -144,7 +145,8 @@ fn check(
     Ok(())
 }
 
-/// What stays the same at every shot: the camera on the flange, or in the base before a part that moves.
+/// The transform that is the same at every shot: the camera on the flange, or the fixed camera in the base before a
+/// moving part.
 fn steady(
     base_from_flange: &Rigid<Base, Flange>,
     cloud_from_camera: &Rigid<Base, Base>,
