@@ -197,6 +197,11 @@ fn the_page_of_connections_shows_what_its_commands_print() {
 }
 
 #[test]
+fn the_page_of_archives_shows_what_its_commands_print() {
+    agree(FOLDERS[4]);
+}
+
+#[test]
 fn every_command_stands_in_a_block_that_runs_or_says_that_it_does_not() {
     let runs: Vec<&str> = FOLDERS.iter().flat_map(|f| f.iter().copied()).collect();
     let (mut counts, mut wrong) = (Vec::new(), Vec::new());
