@@ -288,7 +288,7 @@ fn a_recording_is_named_by_what_sha256sum_prints() {
     let list = std::fs::read_to_string(archive().join("manifest.txt")).unwrap();
     let (hash, name) = list.lines().next().unwrap().split_once("  ").unwrap();
     assert_eq!(name, "recordings/0");
-    let find = "find * -type f | LC_ALL=C sort | xargs sha256sum | sha256sum";
+    let find = "find * -type f -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum";
     let mut bash = Command::new("bash");
     bash.args(["-c", find]).current_dir(archive().join(name));
     assert_eq!(text(&output(bash).stdout).split(' ').next(), Some(hash), "docs/archives.md shows this command");

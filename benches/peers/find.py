@@ -1,6 +1,6 @@
 """In: the pictures that benches/find.rs leaves in target/find-bench, and Criterion's times of Sheetlight on them.
-Out: OpenCV's times for the same search over all rotations: the detector linemod; matchTemplate on the pyramid level where
-Sheetlight's search starts, with the same rotations; matchTemplate at full size (a few rotations, extrapolated to all).
+Out: OpenCV's times for the same search over all rotations: the detector linemod; matchTemplate on the pyramid level
+where Sheetlight's search starts, with the same rotations; matchTemplate at full size (a few rotations, extrapolated to all).
 Unit: milliseconds, best of several runs, with all of OpenCV's threads.
 
     make bench-peers            (or: python find.py --cargo cargo)
@@ -60,8 +60,8 @@ def linemod(scene, template, mask, fill, step):
         t, m = (cv2.copyMakeBorder(i, 16, 16, 16, 16, cv2.BORDER_CONSTANT, value=f) for i, f in ((t, fill), (m, 0)))
         ident, _ = detector.addTemplate([cv2.cvtColor(t, cv2.COLOR_GRAY2BGR)], "part", m)
         added += int(ident >= 0)
-    # linemod needs sides that its strides (5, and 8 at half size) divide. The rows of both sizes must be a multiple of 16 px
-    # long, or its aligned stores crash (opencv/opencv_contrib#4192).
+    # linemod needs sides that its strides (5, and 8 at half size) divide. The rows of both sizes must be a multiple of
+    # 16 px long, or its aligned stores crash (opencv/opencv_contrib#4192).
     h, w = -scene.shape[0] % 80, -scene.shape[1] % 160
     colour = cv2.cvtColor(cv2.copyMakeBorder(scene, 0, h, 0, w, cv2.BORDER_REPLICATE), cv2.COLOR_GRAY2BGR)
     ms, out = best(lambda: detector.match([colour], 75.0, ["part"]), 5)
@@ -97,7 +97,7 @@ def main():
         mask = cv2.dilate(mask, np.ones((7, 7)))
         for what in sorted(k for k in times if k.startswith(name)):
             lines.append(f"{what:52} {times[what]:10.1f}")
-        # The rotations of Sheetlight's coarse search: steps of 1.6 px at the model's rim, on the level where the search starts.
+        # The rotations of Sheetlight's coarse search: steps of 1.6 px at the model's rim, on the level where it starts.
         level = said["levels"] - 1
         count = math.ceil(2 * math.pi * max(said["radius"] / 2**level, 4.0) / 1.6)
         small = [cv2.resize(i, None, fx=0.5**level, fy=0.5**level, interpolation=cv2.INTER_AREA) for i in (scene, template, mask)]

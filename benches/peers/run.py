@@ -1,10 +1,11 @@
 """In: pictures made here. Out: times of OpenCV's chain, a column centroid, a Steger chain and Sheetlight for the same
 pictures, alternating within one run; whether Sheetlight's masks are equal to OpenCV's, pixel for pixel, and whether its
 points agree with OpenCV's lens and the plane.
-Unit: milliseconds a shot, medians over the rounds; ratios are medians of the rounds' ratios. "ours" has the same result as
-OpenCV's chain, a point for the centre of every skeleton pixel. "full" is the chain of a scan, with its settings and
-result: each such pixel gets a fitted peak with its standard deviation and all checks that can reject it. "host" is the same chain
-on the processor. "by CPU" compares the CPU time of all threads, which is more reliable than wall time on a busy machine.
+Unit: milliseconds a shot, medians over the rounds; ratios are medians of the rounds' ratios. "ours" has the same result
+as OpenCV's chain, a point for the centre of every skeleton pixel. "full" is the chain of a scan, with its settings and
+result: each such pixel gets a fitted peak with its standard deviation and all checks that can reject it. "host" is the
+same chain on the processor. "by CPU" compares the CPU time of all threads, which is more reliable than wall time on a
+busy machine.
 "apart" is the largest distance of a point from OpenCV's ray and from the plane, in pixels.
 
     make bench-peers            (or: python run.py --sheetlight target/release/sheetlight)
@@ -70,12 +71,12 @@ def opencv(image, k):
     return lit, thin, points
 
 
-# Thinning propagates by one pixel per sub-iteration. A tile with a margin `AROUND` gives the same pixels as the whole picture.
+# Thinning propagates by one pixel per sub-iteration: a tile with a margin `AROUND` gives the pixels of the whole picture.
 TILE, AROUND = 256, 32
 
 
 def opencv_tiles(image, k):
-    """OpenCV's chain with thinning only in tiles of 256 pixels that contain light: faster than the usual use of OpenCV."""
+    """OpenCV's chain with thinning only in tiles of 256 pixels that contain light: faster than its usual use."""
     lit = cv2.adaptiveThreshold(image, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY, SIZE, -OFFSET)
     thin = np.zeros_like(lit)
     for y in range(0, lit.shape[0], TILE):
@@ -212,8 +213,8 @@ def clock(f, times=1):
 
 
 def points_apart(thin, ours, k):
-    """Largest distance of Sheetlight's points from OpenCV's viewing rays of the same pixels and from the plane, in pixels at
-    their depth; infinite if the pixels differ."""
+    """Largest distance of Sheetlight's points from OpenCV's viewing rays of the same pixels and from the plane, in pixels
+    at their depth; infinite if the pixels differ."""
     px = cv2.findNonZero(thin).reshape(-1, 2)
     px = px[np.lexsort((px[:, 0], px[:, 1]))]
     if len(px) != len(ours) or not np.array_equal(px, ours[:, :2]):

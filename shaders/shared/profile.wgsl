@@ -286,7 +286,7 @@ fn stray_pair(j: i32) -> vec2<f32> {
     return vec2(strays[a >> 2u][a & 3u], strays[b >> 2u][b & 3u]) - (vec2(usual.x) + usual.y * pair(j));
 }
 
-// By how much the variance of their pixels about their steps exceeds the average, with offsets `stray`.
+// Excess of the variance of their pixels about their steps over the average, with offsets `stray`.
 fn spread_pair(j: i32, stray: vec2<f32>) -> vec2<f32> {
     let a = u32(2 * quads + j);
     let b = u32(2 * quads - 1 - j);

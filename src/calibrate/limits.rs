@@ -123,7 +123,7 @@ impl Judgement {
     }
 }
 
-/// rms of the finite values; 0 if there are none.
+/// rms of the finite values; 0 without finite values.
 pub fn rms(values: impl Iterator<Item = f64>) -> f64 {
     let (s, n) = values.filter(|v| v.is_finite()).fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
     f64::sqrt(s / f64::max(n, 1.0))

@@ -57,8 +57,10 @@ def figures(s):
     """What Prometheus scrapes is read by its own parser, and says what the other routes say."""
     refused("figures without a token", s.ask("GET", "/api/v1/metrics", token=False)[0])
     assert s.ask("GET", "/api/v1/metrics")[0] == 200
-    for method, path in (("GET", "/api/v1/bar"), ("GET", "/api/v1/metrics/"), ("POST", "/api/v1/stop"), ("POST", "/api/v1/lease")):
-        refused(f"{path} with the figures' token", s.ask(method, path, {} if method == "POST" else None, token=FIGURES)[0])
+    for path in ("bar", "metrics/"):
+        refused(f"{path} with the figures' token", s.ask("GET", f"/api/v1/{path}", token=FIGURES)[0])
+    for path in ("stop", "lease"):
+        refused(f"{path} with the figures' token", s.ask("POST", f"/api/v1/{path}", {}, token=FIGURES)[0])
     refused("figures with another token", s.ask("GET", "/api/v1/metrics", token=FIGURES[:-1])[0])
     status, head, body = s.ask("GET", "/api/v1/metrics", token=FIGURES)
     assert status == 200 and head["content-type"].startswith("text/plain; version=0.0.4"), (status, head)
@@ -316,7 +318,8 @@ def main():
     token = os.path.join(folder, "figures.token")
     with open(token, "w") as f:
         f.write("too short\n")
-    bad = subprocess.run([program, "station", "serve", "--station", os.path.join(folder, "station"), "--metrics-token-file", token], capture_output=True, text=True, timeout=PATIENCE)
+    served = [program, "station", "serve", "--station", os.path.join(folder, "station"), "--metrics-token-file", token]
+    bad = subprocess.run(served, capture_output=True, text=True, timeout=PATIENCE)
     assert bad.returncode == 2 and "20 printable" in bad.stderr, bad.stderr
     with open(token, "w") as f:
         f.write(FIGURES + "\n")

@@ -45,7 +45,7 @@ pub struct BallFit {
     pub robot_sigma: f64,
     /// Side of the profile plane on which the ball's centre lies in most profiles.
     pub side: Side,
-    /// Excess misfit of the solution on the other side (squared Mahalanobis distance); infinite if there is none.
+    /// Excess misfit of the solution on the other side (squared Mahalanobis distance). Infinite if it does not exist.
     pub side_margin: f64,
     /// One entry per profile, in the order given.
     pub profiles: Vec<ProfileResidual>,

@@ -1,5 +1,5 @@
 //! In: a picture and the description of ArUco or AprilTag markers, one or a grid of them. Out: the corners of the
-//! visible markers with their ids, or the reason why there are none.
+//! visible markers with their ids, or the reason why no marker was found.
 //! Frame and unit: pixels; four ids per marker, clockwise from its upper left corner, markers row by row.
 
 use super::circles::mask;

@@ -113,7 +113,7 @@ pub(super) fn locate(laser: &Image, ambient: Option<&Image>, hot: &[bool], max_w
 struct Picture<'a> {
     grey: Vec<f64>,
     full: f64,
-    /// See [`super::spot::hot_pixels`]; empty if there are none.
+    /// See [`super::spot::hot_pixels`]; empty for a sensor without hot pixels.
     hot: &'a [bool],
     w: usize,
     h: usize,

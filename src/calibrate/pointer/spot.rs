@@ -152,7 +152,7 @@ pub struct SpotPicture<'a> {
 }
 
 /// Finds one spot in each picture. All pictures come from the same camera and laser and share the speckle contrast.
-/// `hot` comes from [`hot_pixels`]; empty if there are none.
+/// `hot` comes from [`hot_pixels`]; empty for a sensor without hot pixels.
 pub fn find_spots(pictures: &[SpotPicture<'_>], hot: &[bool], o: &SpotOptions) -> Result<Vec<Result<Spot>>> {
     o.check()?;
     let mut speckle = o.speckle.unwrap_or(0.15);

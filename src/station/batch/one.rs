@@ -186,11 +186,11 @@ mod tests {
     #[test]
     fn a_problem_names_no_place_of_this_machine() {
         let fault =
-            Fault::input("/a/rec/7/meta.json: is not text").cause("see /out/work/x/scan").next("free /out/work/x");
+            Fault::input("/a/rec/7/meta.json: is not text").cause("see /b/made/x/scan").next("free /b/made/x");
         let places: [(&Path, &str); 3] = [
             (Path::new("/a/rec/7"), "recording"),
-            (Path::new("/out/work/x/scan"), "scan"),
-            (Path::new("/out/work/x"), "results"),
+            (Path::new("/b/made/x/scan"), "scan"),
+            (Path::new("/b/made/x"), "results"),
         ];
         let p = placeless(&fault, &places);
         assert_eq!((p.what.as_str(), p.cause.as_str()), ("recording/meta.json: is not text", "see scan"));
