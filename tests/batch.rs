@@ -227,6 +227,11 @@ fn results_hold_no_time_and_no_place() {
         for word in [place, archive().to_str().unwrap(), year.trim()] {
             assert!(!text.contains(word), "{}: {word}", name.display());
         }
+        if name.ends_with("scan.json") {
+            let report: Value = serde_json::from_slice(bytes).unwrap();
+            assert_eq!((&report["seconds"], &report["shots_per_second"]), (&0.0.into(), &0.0.into()), "{text}");
+            assert_eq!((&report["created"], &report["ran_on"]), (&"1970-01-01T00:00:00Z".into(), &"".into()), "{text}");
+        }
     }
 }
 

@@ -263,6 +263,19 @@ fn terms_that_explain_less_than_print_can_do_are_not_believed() {
     }
     assert!(q.verdict < Verdict::BadlyDetermined);
     assert!(q.reasons.iter().any(|r| r.contains("are not estimated: they explain")), "{:?}", q.reasons);
+    // The same camera held upright: the numbers change places.
+    let mut upright = circles(&reference);
+    upright
+        .iter_mut()
+        .flat_map(|o| &mut o.view.points)
+        .for_each(|p| p.pixel = Vec2::new(1079.0 - p.pixel.y, p.pixel.x));
+    let turned = from_observations(upright, vec![], 1080, 1920, &CameraOptions::default()).unwrap().calibration;
+    let t = turned.value;
+    println!("upright: {t:?}");
+    assert!(t.distortion.is_brown() && turned.quality.verdict == q.verdict, "{:?}", turned.quality);
+    for (lying, upright) in [(k.fx, t.fy), (k.fy, t.fx), (k.cx, t.cy), (1079.0 - k.cy, t.cx)] {
+        assert!((lying - upright).abs() < 0.2, "{lying} {upright}");
+    }
 }
 
 /// Halves of each set of pictures, dealt again and again: how far apart their cameras lie over what both state and

@@ -185,8 +185,7 @@ mod tests {
 
     #[test]
     fn a_problem_names_no_place_of_this_machine() {
-        let fault =
-            Fault::input("/a/rec/7/meta.json: is not text").cause("see /b/made/x/scan").next("free /b/made/x");
+        let fault = Fault::input("/a/rec/7/meta.json: is not text").cause("see /b/made/x/scan").next("free /b/made/x");
         let places: [(&Path, &str); 3] = [
             (Path::new("/a/rec/7"), "recording"),
             (Path::new("/b/made/x/scan"), "scan"),
