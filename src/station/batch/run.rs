@@ -61,11 +61,11 @@ pub fn batch(
         if !mine {
             return Ok(());
         }
-        let line = if stopped(options) { Err(Fault::output("")) } else { bench.one(&entry, &manifest.folder(&entry)) };
+        let line = (!stopped(options)).then(|| bench.one(&entry, &manifest.folder(&entry)));
         // Whatever a scan says of a signal, it was the signal.
-        if stopped(options) {
+        let (Some(line), false) = (line, stopped(options)) else {
             return Err(ended("stopped by a signal", &tally, "Ctrl-C, or the session or the machine was closed"));
-        }
+        };
         let line = line?;
         *match line.state {
             State::Done => &mut tally.done,
