@@ -14,8 +14,9 @@ pub enum Command {
 ///
 /// The camera looks squarely at the parts, and the laser sheet crosses its axis at the working distance.
 #[derive(clap::Args)]
-#[command(after_help = "Example:
+#[command(after_help = "Examples:
   sheetlight rig plan 640x480 --pixel-um 8.3 --focal-mm 5.08 --distance-mm 155 --angle-deg 28
+  sheetlight rig plan 1920x1200 --pixel-um 4.8 --view-mm 150 --distance-mm 300 --scatter-mm 0.01
 Guide: docs/hardware.md")]
 pub struct Args {
     /// Picture size: pixels along the stripe x pixels across it
@@ -25,14 +26,20 @@ pub struct Args {
     #[arg(long, value_name = "UM")]
     pixel_um: f64,
     /// Focal length of the lens, mm
+    #[arg(long, value_name = "MM", required_unless_present = "view_mm", conflicts_with = "view_mm")]
+    focal_mm: Option<f64>,
+    /// Instead of the focal length: width that the picture must see along the stripe, mm
     #[arg(long, value_name = "MM")]
-    focal_mm: f64,
+    view_mm: Option<f64>,
     /// Distance from the lens to the parts, mm
     #[arg(long, value_name = "MM")]
     distance_mm: f64,
     /// Angle between the camera's axis and the laser sheet, degrees
-    #[arg(long, value_name = "DEG")]
-    angle_deg: f64,
+    #[arg(long, value_name = "DEG", required_unless_present = "scatter_mm", conflicts_with = "scatter_mm")]
+    angle_deg: Option<f64>,
+    /// Instead of the angle: how far a point may scatter on a clean stripe, mm (1 sigma)
+    #[arg(long, value_name = "MM")]
+    scatter_mm: Option<f64>,
     /// f-number of the lens
     #[arg(long, value_name = "N", default_value_t = 8.0)]
     f_number: f64,
@@ -53,17 +60,32 @@ impl std::str::FromStr for Pixels {
 
 pub fn run(command: &Command, console: &Console) -> Result<()> {
     let Command::Plan(a) = command;
+    let pixels = a.pixels.0;
+    let of_view = |view| RigPlan::focal_for(view, pixels[0], a.pixel_um, a.distance_mm);
     let plan = RigPlan {
-        pixels: a.pixels.0,
+        pixels,
         pixel_um: a.pixel_um,
-        focal_mm: a.focal_mm,
+        focal_mm: a.focal_mm.or(a.view_mm.map(of_view)).expect("clap requires one"),
         distance_mm: a.distance_mm,
-        angle_deg: a.angle_deg,
+        angle_deg: a.angle_deg.unwrap_or(45.0),
         f_number: a.f_number,
     };
+    let plan = a.scatter_mm.map_or(Ok(plan), |mm| plan.with_scatter(mm))?;
     let forecast = plan.forecast()?;
-    console.result(&forecast, &text(&forecast));
+    let focal = a.view_mm.map(|_| format!("focal length        {:.2} mm\n", plan.focal_mm));
+    let angle = a.scatter_mm.map(|_| format!("angle               {:.1} degrees\n", plan.angle_deg));
+    let chosen = [focal, angle].into_iter().flatten().collect::<String>();
+    console.result(&Planned { plan, forecast: &forecast }, &(chosen + &text(&forecast)));
     Ok(())
+}
+
+/// The design with its forecast, as JSON.
+#[derive(serde::Serialize)]
+struct Planned<'a> {
+    #[serde(flatten)]
+    plan: RigPlan,
+    #[serde(flatten)]
+    forecast: &'a RigForecast,
 }
 
 fn text(f: &RigForecast) -> String {

@@ -4,7 +4,7 @@
 use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::rig::Rig;
-use crate::station::{VerifyReport, VerifyRun, verify};
+use crate::station::{Settings, VerifyReport, VerifyRun, verify};
 use std::path::PathBuf;
 
 /// Check a station with data that its calibrations did not use
@@ -44,9 +44,12 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         object: args.object.clone(),
         touches: args.touch.clone(),
     };
-    let report = verify(&Rig::load(&args.station)?, &run)?;
+    // Settings that other commands refuse are refused here too.
+    Settings::load(&args.station)?;
+    let rig = Rig::load(&args.station)?;
+    let report = verify(&rig, &run)?;
     console.result(&report, &text(&report));
-    Ok(())
+    rig.belong_together()
 }
 
 fn text(r: &VerifyReport) -> String {

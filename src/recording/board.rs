@@ -200,6 +200,15 @@ impl BoardSpec {
         }
     }
 
+    /// The size of the board's cells, mm, under [`BoardSpec::length_key`].
+    pub fn length_mm(&self) -> f64 {
+        match self {
+            BoardSpec::Chessboard { square_mm, .. } | BoardSpec::Charuco { square_mm, .. } => *square_mm,
+            BoardSpec::MarkerGrid { marker_mm, .. } => *marker_mm,
+            BoardSpec::Circles { pitch_mm, .. } => *pitch_mm,
+        }
+    }
+
     /// Positions of the features in the board frame, row by row; a feature's index is its id.
     /// Chessboard and ChArUco: the inner corners; a ChArUco board's origin is one square outside the first of them.
     /// Circles: the centres. In an asymmetric grid (OpenCV's layout) columns are two half pitches apart and odd rows

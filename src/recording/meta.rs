@@ -252,6 +252,12 @@ impl Meta {
                     "describe the board under 'boards'",
                 );
             }
+            if f.board.is_none() && f.ambient.is_some() && self.board.is_none() && boards > 1 {
+                return refuse(
+                    format!("frame {i} does not say which of {boards} boards it shows"),
+                    "give the frame a 'board': the index into 'boards', counted from 0",
+                );
+            }
         }
         Ok(())
     }
@@ -261,8 +267,9 @@ impl Meta {
         self.motion.clone().unwrap_or_default()
     }
 
-    /// The board of a frame: its own, or the only one there is.
+    /// The board of a frame: the one that it names, or the only one.
     pub fn board_of(&self, frame: &FrameRef) -> Option<&BoardSpec> {
-        frame.board.and_then(|i| self.boards.get(i)).or(self.board.as_ref()).or(self.boards.first())
+        let only = self.boards.first().filter(|_| self.boards.len() == 1);
+        frame.board.and_then(|i| self.boards.get(i)).or(self.board.as_ref()).or(only)
     }
 }

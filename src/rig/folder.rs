@@ -251,29 +251,90 @@ impl Rig {
         file(station, kind).is_file()
     }
 
-    /// Refuses a rig if one of its parts was measured with another camera than the station's.
+    /// Refuses a rig that lacks two or more of these kinds, and names all of them. One that lacks a single kind is left
+    /// to that kind's own `need_`.
+    pub fn need_all(&self, kinds: &[Kind]) -> Result<()> {
+        let there: Vec<Kind> = self.records().iter().map(|r| r.kind).collect();
+        let absent: Vec<&Kind> = kinds.iter().filter(|k| !there.contains(k)).collect();
+        if absent.len() < 2 {
+            return Ok(());
+        }
+        let listed = |word: fn(&Kind) -> String| absent.iter().map(|k| word(k)).collect::<Vec<_>>().join(", ");
+        Err(Fault::input(format!("the station has no calibration of these kinds: {}", listed(|kind| kind.words())))
+            .cause(NEVER_CALIBRATED)
+            .next(format!(
+                "run sheetlight calibrate for each in this order: {}; or import known values with sheetlight station \
+                 import",
+                listed(|kind| kind.command())
+            )))
+    }
+
+    /// What the station lacks to scan, as a remark; `None` if it has a camera, a laser plane and a pose of the camera or
+    /// an axis.
+    pub fn unfinished(&self) -> Option<String> {
+        let there: Vec<Kind> = self.records().iter().map(|r| r.kind).collect();
+        let posed = [Kind::HandEye, Kind::BaseCamera, Kind::LinearAxis, Kind::Turntable];
+        let lacks = |kinds: &[Kind]| !kinds.iter().any(|k| there.contains(k));
+        let absent: Vec<&str> = [
+            (lacks(&[Kind::Camera]), "camera"),
+            (lacks(&[Kind::LaserPlane]), "laser plane"),
+            (lacks(&posed), "hand-eye (or base camera, linear axis or turntable)"),
+        ]
+        .into_iter()
+        .filter_map(|(absent, name)| absent.then_some(name))
+        .collect();
+        (!absent.is_empty())
+            .then(|| format!("the station cannot scan yet, it has no calibration of: {}", absent.join(", ")))
+    }
+
+    /// The parts that were measured with another camera than the station's, and what is wrong with each.
+    pub fn stale(&self) -> Vec<(Kind, String)> {
+        let parts = [
+            self.other_camera(&self.laser_plane),
+            self.other_camera(&self.pointer),
+            self.other_camera(&self.hand_eye),
+            self.other_camera(&self.base_camera),
+            self.other_camera(&self.linear_axis),
+            self.other_camera(&self.turntable),
+        ];
+        parts.into_iter().flatten().collect()
+    }
+
+    /// Refuses a rig if one of its parts was measured with another camera than the station's; all of them are named.
     pub fn belong_together(&self) -> Result<()> {
-        self.belonging(&self.laser_plane)?;
-        self.belonging(&self.pointer)?;
-        self.belonging(&self.hand_eye)?;
-        self.belonging(&self.base_camera)?;
-        self.belonging(&self.linear_axis)?;
-        self.belonging(&self.turntable).map(|_| ())
+        let stale = self.stale();
+        let listed = |word: fn(&Kind) -> String| stale.iter().map(|(k, _)| word(k)).collect::<Vec<_>>().join(", ");
+        match &stale[..] {
+            [] => Ok(()),
+            [(kind, what)] => Err(made_with_another(*kind, what.clone())),
+            _ => {
+                let now = self.camera.as_ref().map(Calibration::content).unwrap_or_default();
+                let names = listed(|kind| kind.words());
+                let what = format!("{} calibrations were measured with another camera than {now:.12}", stale.len());
+                Err(Fault::refused(format!("{what}: {names}"))
+                    .cause(OTHER_CAMERA)
+                    .next(format!("run sheetlight calibrate again for each: {}", listed(|kind| kind.command()))))
+            }
+        }
     }
 
     fn belonging<'a, T>(&self, part: &'a Option<Calibration<T>>) -> Result<Option<&'a Calibration<T>>> {
-        let (Some(c), Some(camera)) = (part, &self.camera) else { return Ok(part.as_ref()) };
+        self.other_camera(part).map_or(Ok(part.as_ref()), |(kind, what)| Err(made_with_another(kind, what)))
+    }
+
+    /// Which part it is, and what is wrong, if it was measured with another camera than the station's.
+    fn other_camera<T>(&self, part: &Option<Calibration<T>>) -> Option<(Kind, String)> {
+        let (c, camera) = (part.as_ref()?, self.camera.as_ref()?);
         let (now, then) = (camera.content(), c.rests_on.get(&Kind::Camera));
         if !c.kind.rests_on_camera() || then == Some(&now) {
-            return Ok(part.as_ref());
+            return None;
         }
-        let (what, kind) = (c.kind.words(), c.kind);
-        Err(Fault::refused(match then {
+        let what = c.kind.words();
+        let why = match then {
             Some(then) => format!("the {what} was measured with camera {then:.12}, the station now has {now:.12}"),
             None => format!("the {what} names no camera, the station has camera {now:.12}"),
-        })
-        .cause("the camera was calibrated or imported again, or files of two stations were mixed")
-        .next(again(kind)))
+        };
+        Some((c.kind, why))
     }
 
     /// The joint covariance of camera, laser plane and the camera's pose. `None` if none was ever stated.
@@ -366,24 +427,31 @@ fn together(folder: &Path) -> Together<'_> {
     Together::new(folder, "import", keep_former)
 }
 
+fn made_with_another(kind: Kind, what: String) -> Fault {
+    let next = format!("run sheetlight calibrate {} again", kind.command());
+    Fault::refused(what)
+        .cause(OTHER_CAMERA)
+        .next(format!("{next}; put camera.previous.json back only if the camera's new calibration was a mistake"))
+}
+
+const OTHER_CAMERA: &str = "the camera was calibrated or imported again, or files of two stations were mixed";
+
 fn again(kind: Kind) -> String {
     format!(
-        "run sheetlight calibrate {} again, put {}.previous.json back, or vouch for it with sheetlight station seal \
-         --kind {} \
-         --because WHY",
+        "run sheetlight calibrate {} again; if you know that its values are right, sheetlight station seal --kind {} \
+         --because WHY accepts them on your word",
         kind.command(),
-        kind.name(),
         kind.name().replace('_', "-")
     )
 }
 
+const NEVER_CALIBRATED: &str = "it was never calibrated, or another folder was given as --station";
+
 fn missing(kind: Kind) -> Fault {
-    Fault::input(format!("the station has no {} calibration", kind.words()))
-        .cause("it was never calibrated, or another folder was given as --station")
-        .next(format!(
-            "run sheetlight calibrate {}, or import known values with sheetlight station import",
-            kind.command()
-        ))
+    Fault::input(format!("the station has no {} calibration", kind.words())).cause(NEVER_CALIBRATED).next(format!(
+        "run sheetlight calibrate {}, or import known values with sheetlight station import",
+        kind.command()
+    ))
 }
 
 fn file(station: &Path, kind: Kind) -> PathBuf {
@@ -449,6 +517,11 @@ mod tests {
         let former: Calibration<Plane<Camera>> = unsealed(&former, "former").unwrap();
         assert_eq!(former.value, first.laser_plane.unwrap().value);
         assert!(second.camera.is_none() && second.need_camera().is_err());
+        let lacks = second.unfinished().unwrap();
+        assert!(lacks.ends_with("of: camera, hand-eye (or base camera, linear axis or turntable)"), "{lacks}");
+        let said = second.need_all(&[Kind::Camera, Kind::LaserPlane, Kind::HandEye]).unwrap_err();
+        assert!(said.what.ends_with(": camera, hand-eye") && said.next.contains("order: camera, hand-eye;"), "{said}");
+        second.need_all(&[Kind::Camera, Kind::LaserPlane]).unwrap();
     }
 
     #[test]
@@ -463,6 +536,11 @@ mod tests {
         let said = rig.need_laser_plane().unwrap_err();
         assert!(said.what.contains("measured with camera") && said.next.contains("calibrate laser-plane"), "{said}");
         assert!(rig.belong_together().is_err() && rig.remarks().is_empty());
+        let beam = Ray::new(Vec3::new(30.0, 0.0, 0.0), Vec3::z()).unwrap();
+        let pointer = Calibration::new(Kind::Pointer, beam, Some(&old), Covariance::default(), quality());
+        let all = Rig { pointer: Some(pointer), ..rig };
+        let said = all.belong_together().unwrap_err();
+        assert!(said.what.ends_with("laser plane, pointer") && said.next.ends_with("laser-plane, pointer"), "{said}");
         Rig::vouch::<Plane<Camera>>(dir.path(), Kind::LaserPlane, "only the focus was touched", false).unwrap();
         let rig = Rig::load(dir.path()).unwrap();
         rig.need_laser_plane().unwrap();

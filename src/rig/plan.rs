@@ -5,7 +5,7 @@ use crate::fault::{Fault, Result};
 
 /// A camera that looks squarely at the parts, and a laser sheet that crosses the camera's axis at the working
 /// distance.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct RigPlan {
     /// Size of the picture, px; the first number is along the stripe.
     pub pixels: [u32; 2],
@@ -41,7 +41,40 @@ pub struct RigForecast {
     pub shadow_mm: f64,
 }
 
+/// Stripe centres are found to this many pixels, 1 sigma, at best and at worst, on a clean stripe.
+const CENTRE_PX: [f64; 2] = [0.02, 0.05];
+/// Accepted angles between camera and laser sheet, degrees.
+const ANGLE_DEG: [f64; 2] = [3.0, 80.0];
+
 impl RigPlan {
+    /// The focal length, mm, with which `pixels` of this edge see a view of `view_mm` at `distance_mm`.
+    pub fn focal_for(view_mm: f64, pixels: u32, pixel_um: f64, distance_mm: f64) -> f64 {
+        distance_mm * f64::from(pixels) * pixel_um / 1000.0 / view_mm
+    }
+
+    /// The plan with the smallest angle at which a point on a clean stripe scatters by `scatter_mm` at most, mm, 1
+    /// sigma.
+    ///
+    /// # Errors
+    /// A scatter that no angle up to 80 degrees gives; values that [`RigPlan::forecast`] refuses.
+    pub fn with_scatter(self, scatter_mm: f64) -> Result<RigPlan> {
+        if !(scatter_mm > 0.0 && scatter_mm.is_finite()) {
+            return Err(Fault::usage(format!("scatter_mm is {scatter_mm}; a length above 0 mm is needed"))
+                .next("state how far a point may scatter, 1 sigma"));
+        }
+        let pixel_mm = RigPlan { angle_deg: 45.0, ..self }.forecast()?.pixel_mm;
+        let angle_deg = (CENTRE_PX[1] * pixel_mm / scatter_mm).atan().to_degrees();
+        if angle_deg > ANGLE_DEG[1] {
+            return Err(Fault::refused(format!(
+                "a scatter of {scatter_mm} mm needs an angle of {angle_deg:.1} degrees; {} is the limit",
+                ANGLE_DEG[1]
+            ))
+            .cause(format!("a pixel sees {pixel_mm:.4} mm, which is too coarse"))
+            .next("take a camera with more pixels, a longer focal length or a shorter distance"));
+        }
+        Ok(RigPlan { angle_deg: angle_deg.max(ANGLE_DEG[0]), ..self })
+    }
+
     /// # Errors
     /// A value that no camera, lens or laser has.
     pub fn forecast(&self) -> Result<RigForecast> {
@@ -49,7 +82,7 @@ impl RigPlan {
             ("pixel_um", self.pixel_um, 0.5, 50.0),
             ("focal_mm", self.focal_mm, 0.5, 2000.0),
             ("distance_mm", self.distance_mm, 1.0, 20_000.0),
-            ("angle_deg", self.angle_deg, 3.0, 80.0),
+            ("angle_deg", self.angle_deg, ANGLE_DEG[0], ANGLE_DEG[1]),
             ("f_number", self.f_number, 0.5, 64.0),
         ];
         for (name, value, least, most) in limits {
@@ -80,7 +113,7 @@ impl RigPlan {
             pixel_mm,
             view_mm: self.pixels.map(|n| f64::from(n) * pixel_mm),
             depth_per_pixel_mm,
-            scatter_mm: [0.02, 0.05].map(|px| px * depth_per_pixel_mm),
+            scatter_mm: CENTRE_PX.map(|px| px * depth_per_pixel_mm),
             stripe_mm,
             sharp_mm,
             shadow_mm: tan,
@@ -133,6 +166,19 @@ mod tests {
             let blur = plan.focal_mm / plan.f_number * (v - v0).abs() / v;
             assert!((blur - 0.0083).abs() < 1e-6, "{z}: {blur}");
         }
+    }
+
+    #[test]
+    fn a_wanted_view_and_scatter_give_the_lens_and_the_angle() {
+        let focal_mm = RigPlan::focal_for(162.1, 640, 8.3, 155.0);
+        assert!((focal_mm - 5.08).abs() < 1e-3, "{focal_mm}");
+        let plan = RigPlan { angle_deg: 10.0, ..GUIDE }.with_scatter(0.0238).unwrap();
+        assert!((plan.angle_deg - 28.0).abs() < 0.1, "{plan:?}");
+        assert!((plan.forecast().unwrap().scatter_mm[1] - 0.0238).abs() < 1e-9);
+        let fine = GUIDE.with_scatter(0.001).unwrap_err();
+        assert!(fine.what.contains("85.5 degrees") && fine.cause.contains("0.2532 mm"), "{fine}");
+        assert!(GUIDE.with_scatter(f64::NAN).is_err());
+        assert_eq!(GUIDE.with_scatter(10.0).unwrap().angle_deg, 3.0);
     }
 
     #[test]

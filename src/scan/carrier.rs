@@ -6,7 +6,7 @@
 use crate::fault::{Fault, Result};
 use crate::geometry::{Axis, AxisKind, Base, Camera, Ride, Rigid, Twist, Vec3};
 use crate::recording::{Carries, Motion, Slip, Stand};
-use crate::rig::{HandEye, Rig, axis_sigma};
+use crate::rig::{HandEye, Kind, Rig, axis_sigma};
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
 /// Pose of the camera relative to the part.
@@ -66,6 +66,17 @@ pub fn parts_for(rig: &Rig, motion: &Motion) -> Rig {
         pointer: None,
         ..rig.clone()
     }
+}
+
+/// The calibrations that a scan with this motion needs.
+pub fn needs(motion: &Motion) -> [Kind; 3] {
+    let pose = match (motion.axis(), motion.carries) {
+        (None, Carries::Sensor) => Kind::HandEye,
+        (None, Carries::Part) => Kind::BaseCamera,
+        (Some(AxisKind::Linear), _) => Kind::LinearAxis,
+        (Some(AxisKind::Turntable), _) => Kind::Turntable,
+    };
+    [Kind::Camera, Kind::LaserPlane, pose]
 }
 
 impl Carrier {

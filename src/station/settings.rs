@@ -103,12 +103,15 @@ impl Settings {
     /// Unknown keys, and what [`Settings::check`] refuses.
     pub fn parse(text: &str) -> Result<Settings> {
         let settings: Settings = toml::from_str(text).map_err(|e| {
-            Fault::input(format!("is not a station file: {}", e.to_string().trim_end()))
-                .cause(crate::files::slip_at(
-                    text,
-                    e.span().map_or(0, |s| s.start),
-                    "a misspelt key or a value of the wrong type",
-                ))
+            let place = e.span().map_or(0, |s| s.start);
+            let fault = Fault::input(format!("is not a station file: {}", e.to_string().trim_end()));
+            if let Some(key) = below_a_section(text, place) {
+                return fault
+                    .cause(format!("{key} stands below a [section] line, so TOML counts it to that section"))
+                    .next(format!("move {key} above the first line that begins with ["));
+            }
+            fault
+                .cause(crate::files::slip_at(text, place, "a misspelt key or a value of the wrong type"))
                 .next("compare it with docs/file-formats.md, or with what sheetlight station new writes")
         })?;
         settings.check()?;
@@ -167,12 +170,39 @@ impl Settings {
         self.working_volume.map(|v| Volume::new(v.near_mm, v.far_mm, "station.toml"))
     }
 
-    /// Writes `station/station.toml`.
+    /// Writes `station/station.toml`. Keys that are worth setting and were left out stand there as comments.
     pub fn store(&self, station: &Path) -> Result<()> {
         crate::files::make_folder(station)?;
         let text = toml::to_string(self).expect("plain data");
+        let first_section = text.find("\n[").map_or(text.len(), |at| at + 1);
+        let (keys, sections) = text.split_at(first_section);
+        let tolerance = if self.tolerance_mm.is_none() { TOLERANCE } else { "" };
+        let volume = if self.working_volume.is_none() { VOLUME } else { "" };
+        let text = format!("{}{tolerance}{volume}\n{sections}", keys.trim_end_matches('\n').to_owned() + "\n");
         crate::files::write(&station.join("station.toml"), text.as_bytes())
     }
+}
+
+const TOLERANCE: &str = "
+# What your work tolerates, mm. Calibrations are judged by it; without it by 0.15 % of the camera's view.
+# tolerance_mm = 0.2
+";
+const VOLUME: &str = "
+# Nearest and farthest distance from the camera to a part, mm. Without them the depths of the calibration boards count.
+# [working_volume]
+# near_mm = 100.0
+# far_mm = 300.0
+";
+
+/// The keys that stand above all sections.
+const TOP: [&str; 4] = ["name", "robot", "mount", "tolerance_mm"];
+
+/// The key at this place of a station.toml, if it belongs above all sections and stands below one.
+fn below_a_section(text: &str, place: usize) -> Option<&'static str> {
+    let (before, rest) = (text.get(..place)?, text.get(place..)?);
+    let within = before.lines().any(|line| line.trim_start().starts_with('['));
+    let word: String = rest.chars().take_while(|c| c.is_ascii_alphanumeric() || *c == '_').collect();
+    TOP.into_iter().find(|key| within && *key == word)
 }
 
 #[cfg(test)]
@@ -183,6 +213,8 @@ mod tests {
     fn unknown_keys_and_swapped_volumes_are_refused() {
         assert!(Settings::parse("name = 'a'").is_ok());
         assert!(Settings::parse("nam = 'a'").unwrap_err().what.contains("nam"));
+        let below = Settings::parse("[extraction]\nspacing = 1.5\ntolerance_mm = 0.1").unwrap_err();
+        assert!(below.cause.contains("below a [section]") && below.next.contains("move tolerance_mm"), "{below}");
         assert!(Settings::parse("[working_volume]\nnear_mm = 300\nfar_mm = 100").is_err());
         assert!(Settings::parse("tolerance_mm = 0").unwrap_err().what.contains("tolerance_mm"));
         let metres = Settings::parse("[working_volume]\nnear_mm = 0.06\nfar_mm = 0.32").unwrap_err();
@@ -198,5 +230,15 @@ mod tests {
         assert!(comma.cause.contains("decimal comma") && comma.what.contains("line 2"), "{comma}");
         let s = Settings { name: "x".into(), robot: Some(Convention::Denso), ..Settings::default() };
         assert_eq!(Settings::parse(&toml::to_string(&s).unwrap()).unwrap(), s);
+        // The keys that are written as comments can be used by removing the "# ".
+        let dir = tempfile::tempdir().unwrap();
+        s.store(dir.path()).unwrap();
+        assert_eq!(Settings::load(dir.path()).unwrap(), s);
+        let text = std::fs::read_to_string(dir.path().join("station.toml")).unwrap();
+        let used = ["tolerance_mm", "[working_volume]", "near_mm", "far_mm"]
+            .iter()
+            .fold(text, |text, key| text.replace(&format!("# {key}"), key));
+        let used = Settings::parse(&used).unwrap();
+        assert_eq!((used.tolerance_mm, used.volume().map(|v| v.far_mm)), (Some(0.2), Some(300.0)));
     }
 }

@@ -40,7 +40,7 @@ pub struct ObjectCheck {
 /// Fit and verification of one calibration, never mixed.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct CalibrationCheck {
-    /// good, usable, badly determined or refused.
+    /// good, usable, badly determined, refused, or "of another camera".
     pub verdict: String,
     /// Residuals of the data that was fitted.
     pub fit: BTreeMap<String, f64>,
@@ -66,6 +66,9 @@ pub struct VerifyReport {
     pub remarks: Vec<String>,
 }
 
+/// Verdict of a calibration that was measured with another camera than the station's.
+const OTHER_CAMERA: &str = "of another camera";
+
 fn check<T>(c: &Calibration<T>) -> CalibrationCheck {
     let pick = |f: &dyn Fn(&str) -> bool| -> BTreeMap<String, f64> {
         c.quality.figures.iter().filter(|(k, _)| f(k)).map(|(k, v)| (k.clone(), *v)).collect()
@@ -80,7 +83,12 @@ fn check<T>(c: &Calibration<T>) -> CalibrationCheck {
 /// Checks a station with data that its calibrations did not use.
 pub fn verify(rig: &Rig, run: &VerifyRun) -> Result<VerifyReport> {
     let mut calibrations = BTreeMap::new();
-    let mut add = |name: &str, c: Option<CalibrationCheck>| c.map(|c| calibrations.insert(name.to_owned(), c));
+    let stale = rig.stale();
+    let mut add = |name: &str, c: Option<CalibrationCheck>| {
+        let other = stale.iter().any(|(kind, _)| kind.words() == name);
+        let judged = c.map(|c| if other { CalibrationCheck { verdict: OTHER_CAMERA.into(), ..c } } else { c });
+        judged.map(|c| calibrations.insert(name.to_owned(), c))
+    };
     add("camera", rig.camera.as_ref().map(check));
     add("laser plane", rig.laser_plane.as_ref().map(check));
     add("pointer", rig.pointer.as_ref().map(check));
@@ -118,7 +126,8 @@ pub fn verify(rig: &Rig, run: &VerifyRun) -> Result<VerifyReport> {
     let object = if run.object.is_empty() { None } else { Some(object(rig, &run.object)?) };
     let mut remarks = rig.remarks();
     remarks.extend(object.as_ref().and_then(ObjectCheck::remark));
-    remarks.extend(rig.belong_together().err().map(|fault| fault.what));
+    remarks.extend(stale.into_iter().map(|(_, what)| what));
+    remarks.extend(rig.unfinished());
     Ok(VerifyReport { calibrations, flat, object, touch, remarks })
 }
 

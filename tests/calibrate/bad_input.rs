@@ -123,12 +123,18 @@ fn a_wrong_board_is_told_by_its_size() {
     let c = Case::new("intrinsics");
     c.meta(|m| m["board"]["inner_corners"] = json!([8, 6]));
     c.fails("camera", &[], &["0 of 20", "9x6", "wrong board size"]);
+    // Too many corners stated: the board that is there is named, once.
+    c.meta(|m| m["board"]["inner_corners"] = json!([10, 6]));
+    c.fails("camera", &[], &["0 of 20", "and 2 more alike", "wrong board size", "state inner_corners [9, 6]"]);
     c.meta(|m| m["board"]["inner_corners"] = json!([9, 6, 1]));
     c.fails("camera", &[], &["meta.json"]);
     // Squares 3 % smaller than stated show against the robot's lengths.
     let c = Case::new("handeye");
     c.meta(|m| m["board"]["square_mm"] = json!(15.0 / 0.97));
     c.fails("hand-eye", &NOISY, &["the board's lengths are 97.0 %", "square_mm"]);
+    let c = Case::new("laserplane");
+    c.meta(|m| m["frames"][3].as_object_mut().unwrap().remove("board").map_or((), drop));
+    c.fails("laser-plane", &["--on", "cpu"], &["frame 3 does not say which of 2 boards it shows", "counted from 0"]);
     let c = Case::new("laserplane");
     c.meta(|m| m["boards"] = json!([{"type": "chessboard", "inner_corners": [7, 3], "square_mm": 8.0}]));
     c.fails("laser-plane", &["--on", "cpu"], &["board"]);

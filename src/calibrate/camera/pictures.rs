@@ -155,7 +155,18 @@ fn too_few(found: usize, all: usize, left_out: &[(String, Fault)]) -> Fault {
     // The most frequent reason among the pictures; the first one of equally frequent reasons.
     let votes = |l: &(String, Fault)| left_out.iter().filter(|o| o.1.cause == l.1.cause).count();
     let first = left_out.iter().rev().max_by_key(|l| votes(l)).map(|l| l.1.clone());
-    let listed: String = left_out.iter().map(|(n, f)| format!("\n    {n}: {}", f.what)).collect();
+    let alike = |a: &Fault, b: &Fault| a.cause == b.cause && a.next == b.next;
+    let listed: String = (0..left_out.len())
+        .filter(|i| !left_out[..*i].iter().any(|l| alike(&l.1, &left_out[*i].1)))
+        .map(|i| {
+            let (name, fault) = &left_out[i];
+            let more = match left_out.iter().filter(|l| alike(&l.1, fault)).count() - 1 {
+                0 => String::new(),
+                n => format!(" (and {n} more alike)"),
+            };
+            format!("\n    {name}{more}: {}", fault.what)
+        })
+        .collect();
     let not_searched = match all - found - left_out.len() {
         0 => String::new(),
         n => format!("; {} agree about another board, and the other {n} were not searched", left_out.len()),

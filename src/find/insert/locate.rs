@@ -118,8 +118,11 @@ fn located(
     let matches = search(map, recipe, options, least)?;
     if matches.is_empty() {
         return Err(Fault::refused(format!("'{}' was not found: nothing scores {least:.2} or more", recipe.name))
-            .cause("the part is missing, different, hidden, or outside the scan")
-            .next("look at the height map of the scan; scan the part again, or teach it again"));
+            .cause("the part is missing, different, hidden, outside the scan, or the scan has a wrong scale")
+            .next(
+                "look at the scan's height map and measure a known length in it: if it is wrong, check the sizes of the \
+                 calibration boards; otherwise scan or teach the part again",
+            ));
     }
     let all = if options.all { places(&matches, map) } else { vec![] };
     let part = examine(points, map, recipe, options.expected.as_ref(), &matches)?;

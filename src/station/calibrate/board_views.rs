@@ -89,6 +89,18 @@ pub fn boards(
     Ok(out)
 }
 
+/// The reason that states which board sizes a calibration without robot poses rests on: it cannot check them.
+pub(super) fn unchecked_size<'a>(boards: impl IntoIterator<Item = &'a BoardSpec>) -> String {
+    let mut sizes: Vec<String> =
+        boards.into_iter().map(|b| format!("{} {} mm", b.length_key(), b.length_mm())).collect();
+    sizes.sort();
+    sizes.dedup();
+    format!(
+        "all lengths scale with the stated board size, which this calibration cannot check: {}; measure the board",
+        sizes.join(", ")
+    )
+}
+
 /// A board in a picture, and the diameter of its dots if the description does not state it.
 type Seen = (FrameBoard, Option<f64>);
 

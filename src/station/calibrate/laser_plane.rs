@@ -2,7 +2,7 @@
 //! calibration. The stripe is found by the scan engine's own stages and a straight line on each board.
 //! Frame and unit: camera frame, mm.
 
-use super::board_views::{Boards, FrameBoard, boards};
+use super::board_views::{Boards, FrameBoard, boards, unchecked_size};
 use super::hand_eye::{Calibrated, first_line};
 use super::room_light::{self, lit};
 use super::straight::keep_straight;
@@ -71,6 +71,7 @@ pub fn calibrate_laser_plane(
     let lit = Volume::new(fit.reach[0], fit.reach[1], "where the boards were lit");
     let limits = run.asked.limits(&lit, |z| camera.value.view_mm(z));
     let mut quality = judge(&fit, &views, &camera.value, &limits);
+    quality.reasons.push(unchecked_size(seen.iter().map(|s| &s.board)));
     quality.reasons.extend(missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))));
     let page = page(&fit, &views, &quality, (camera.value.width, camera.value.height));
     let mut calibration = Calibration::new(Kind::LaserPlane, fit.plane, Some(camera), covariance(&fit), quality);

@@ -2,7 +2,7 @@
 //! pointer's calibration.
 //! Frame and unit: camera frame, mm.
 
-use super::board_views::{Boards, boards};
+use super::board_views::{Boards, boards, unchecked_size};
 use super::hand_eye::{Calibrated, first_line};
 use super::room_light::{self, lit};
 use crate::calibrate::limits::Asked;
@@ -78,6 +78,7 @@ pub fn calibrate_pointer(
     let seen = Volume::new(fit.reach[0], fit.reach[1], "where the spots lay");
     let limits = run.asked.limits(&seen, |z| camera.value.view_mm(z));
     let mut quality = judge(&fit, &camera.value, sigmas[sigmas.len() / 2], &limits);
+    quality.reasons.push(unchecked_size(pictures.iter().map(|(b, ..)| &b.board)));
     quality.reasons.extend(missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))));
     let page = page(&fit, &quality);
     let mut calibration = Calibration::new(Kind::Pointer, fit.beam, Some(camera), covariance(&fit), quality);

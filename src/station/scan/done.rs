@@ -8,7 +8,7 @@ use super::seen::Seen;
 use crate::capture::Delay;
 use crate::fault::Result;
 use crate::rig::{Rig, Volume};
-use crate::scan::{Carrier, Pictures, Processor, Scanner, Source};
+use crate::scan::{Carrier, Pictures, Processor, Scanner, Source, needs};
 use std::collections::BTreeMap;
 
 /// Data of a scan after its last shot.
@@ -92,6 +92,7 @@ pub(super) fn scanner_for(
     processor: Processor,
 ) -> Result<(Scanner, Seen)> {
     let (volume, ambient) = (options.volume.as_ref(), options.ambient.clone());
+    rig.need_all(&needs(&options.motion))?;
     let carrier = Carrier::new(rig, &options.motion)?;
     let scanner = Scanner::new(rig, carrier, pictures, &options.extraction, volume, ambient, processor)?;
     let camera = rig.need_camera()?.for_pictures(pictures.size(), pictures.readout.as_ref())?;

@@ -228,11 +228,12 @@ fn why_not(best: Option<&Grid>, columns: usize, rows: usize, span: f64, grey: &G
         let border = 1.3 * pitch;
         p.x < border || p.y < border || p.x > grey.width as f64 - border || p.y > grey.height as f64 - border
     });
-    // A complete lattice that is larger than the requested one is not a board that was cut off.
-    if grid.count() == c * r && c * r >= wc * wr && (!cut || (c >= wc && r >= wr && (c, r) != (wc, wr))) {
-        return Fault::refused(seen)
-            .cause(WRONG_SIZE)
-            .next(format!("if the board has {c}x{r} inner corners, say so in its description"));
+    // A complete lattice of another size is another board, unless the picture's edge cut off a larger board.
+    let other = (c, r) != (wc, wr) && (!cut || (c >= wc && r >= wr));
+    if grid.count() == c * r && other {
+        return Fault::refused(seen).cause(WRONG_SIZE).next(format!(
+            "if the board has {c}x{r} inner corners, state inner_corners [{c}, {r}] in its description; else uncover it"
+        ));
     }
     if cut {
         return Fault::refused(format!("{seen} and touches the picture's edge"))
