@@ -269,7 +269,7 @@ impl Rig {
             )))
     }
 
-    /// What the station lacks to scan, as a remark; `None` if it has a camera, a laser plane and a pose of the camera or
+    /// What the station lacks to scan, as a remark; `None` if it has a camera, a laser plane, and the camera's pose or
     /// an axis.
     pub fn unfinished(&self) -> Option<String> {
         let there: Vec<Kind> = self.records().iter().map(|r| r.kind).collect();

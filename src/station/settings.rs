@@ -104,15 +104,17 @@ impl Settings {
     pub fn parse(text: &str) -> Result<Settings> {
         let settings: Settings = toml::from_str(text).map_err(|e| {
             let place = e.span().map_or(0, |s| s.start);
-            let fault = Fault::input(format!("is not a station file: {}", e.to_string().trim_end()));
-            if let Some(key) = below_a_section(text, place) {
-                return fault
-                    .cause(format!("{key} stands below a [section] line, so TOML counts it to that section"))
-                    .next(format!("move {key} above the first line that begins with ["));
-            }
-            fault
-                .cause(crate::files::slip_at(text, place, "a misspelt key or a value of the wrong type"))
-                .next("compare it with docs/file-formats.md, or with what sheetlight station new writes")
+            let (cause, next) = match below_a_section(text, place) {
+                Some(key) => (
+                    format!("{key} stands below a [section] line, so TOML counts it to that section"),
+                    format!("move {key} above the first line that begins with ["),
+                ),
+                None => (
+                    crate::files::slip_at(text, place, "a misspelt key or a value of the wrong type").into(),
+                    "compare it with docs/file-formats.md, or with what sheetlight station new writes".into(),
+                ),
+            };
+            Fault::input(format!("is not a station file: {}", e.to_string().trim_end())).cause(cause).next(next)
         })?;
         settings.check()?;
         Ok(settings)

@@ -68,7 +68,7 @@ fn calibrations_that_are_none_are_refused() {
             forged(&b, "camera", |v| (v["value"]["fx"], v["value"]["fy"]) = (json!(8.0), json!(8.0))),
         ),
         ("negative focal length", "no camera", forged(&b, "camera", |v| v["value"]["fx"] = json!(-305.0))),
-        ("another camera", "measured with camera", forged(&b, "camera", |v| v["value"]["fx"] = json!(306.0))),
+        ("another camera", "measured with another camera", forged(&b, "camera", |v| v["value"]["fx"] = json!(306.0))),
         ("no camera named", "names no camera", forged(&b, "laser_plane", |v| v["rests_on"] = json!({}))),
         ("last row of a transform", "last row", forged(&b, "hand_eye", |v| v["value"][12] = json!(1.0))),
         ("mirrored transform", "", forged(&b, "hand_eye", |v| v["value"][0] = json!(-1.0))),
@@ -215,7 +215,7 @@ fn an_import_is_all_or_nothing() {
         json!({"intrinsics": serde_json::from_str::<Value>(&VALUES.replace("305.8", "310")).unwrap()["intrinsics"]});
     run(&import(&camera.to_string(), &[]));
     let said = refused(&b.scan("recording", "out", &[]));
-    assert!(said.contains("measured with camera") && said.contains("calibrate laser-plane"), "{said}");
+    assert!(said.contains("measured with another camera") && said.contains("laser-plane, hand-eye"), "{said}");
     run(&import(VALUES, &[]));
     run(&b.scan("recording", "out", &[]));
     // Metres that are meant.

@@ -125,7 +125,7 @@ fn a_wrong_board_is_told_by_its_size() {
     c.fails("camera", &[], &["0 of 20", "9x6", "wrong board size"]);
     // Too many corners stated: the board that is there is named, once.
     c.meta(|m| m["board"]["inner_corners"] = json!([10, 6]));
-    c.fails("camera", &[], &["0 of 20", "and 2 more alike", "wrong board size", "state inner_corners [9, 6]"]);
+    c.fails("camera", &[], &["0 of 20", "(4 pictures)", "wrong board size", "state inner_corners [9, 6]"]);
     c.meta(|m| m["board"]["inner_corners"] = json!([9, 6, 1]));
     c.fails("camera", &[], &["meta.json"]);
     // Squares 3 % smaller than stated show against the robot's lengths.

@@ -160,9 +160,12 @@ fn too_few(found: usize, all: usize, left_out: &[(String, Fault)]) -> Fault {
         .filter(|i| !left_out[..*i].iter().any(|l| alike(&l.1, &left_out[*i].1)))
         .map(|i| {
             let (name, fault) = &left_out[i];
-            let more = match left_out.iter().filter(|l| alike(&l.1, fault)).count() - 1 {
-                0 => String::new(),
-                n => format!(" (and {n} more alike)"),
+            let names: Vec<&String> = left_out.iter().filter(|l| alike(&l.1, fault)).map(|l| &l.0).collect();
+            let more = match names[..] {
+                [_] => String::new(),
+                [_, other] => format!(" and {other}"),
+                [.., last] => format!(" ... {last} ({} pictures)", names.len()),
+                [] => unreachable!("the picture itself"),
             };
             format!("\n    {name}{more}: {}", fault.what)
         })
