@@ -266,7 +266,7 @@ fn summary(r: &ScanReport, out: &Path) -> String {
         s += &format!("  {:>9} peaks {fate} ({:.2} %)\n", n, 100.0 * *n as f64 / all.max(1) as f64);
     }
     if r.hot_pixels > 0 {
-        s += &format!("{} pixels of the sensor shine by themselves: their neighbours stand for them\n", r.hot_pixels);
+        s += &format!("{} hot pixels were replaced by their neighbours\n", r.hot_pixels);
     }
     if let Some(p) = &r.places {
         s += &format!("{p}\n");

@@ -90,8 +90,8 @@ impl Otherwise {
             )),
             how => Err(Fault::refused(format!("the pictures are {how}, compared with those of the calibration"))
                 .cause(format!(
-                    "{alike} of {of} hot pixels lie where that puts them: ReverseX, ReverseY or the region of the \
-                     camera, or a driver's flip, was changed after the calibration"
+                    "{alike} of {of} hot pixels agree with this change: the camera's ReverseX, ReverseY or region, or \
+                     a driver's flip, was changed after the calibration"
                 ))
                 .next("set the camera as it was at its calibration, or calibrate it again")),
         }

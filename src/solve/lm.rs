@@ -89,12 +89,8 @@ impl End {
     pub fn remark(self) -> Option<&'static str> {
         match self {
             End::Minimum => None,
-            End::Exhausted => Some(
-                "the fit had not come to rest at its last step: the values may be off by more than their sigmas say",
-            ),
-            End::Stuck => {
-                Some("the fit stopped where no further step was possible: its sigmas do not say how far it is off")
-            }
+            End::Exhausted => Some("the fit did not converge: the values' errors may exceed their sigmas"),
+            End::Stuck => Some("the fit stopped before a minimum: its sigmas do not describe its errors"),
         }
     }
 }

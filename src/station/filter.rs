@@ -82,7 +82,7 @@ pub fn filter_scan(scan: &Path, filters: &[Filter], out: &Path) -> Result<ScanRe
     let middle = sigmas.len() / 2;
     let median = *sigmas.select_nth_unstable_by(middle, f32::total_cmp).1;
     let taken: usize = filtered.cells.iter().sum();
-    let remark = format!("filtered: {taken} cells and {} points were taken away", report.points - count);
+    let remark = format!("filtered: {taken} cells and {} points were removed", report.points - count);
     let report = ScanReport {
         created: jiff::Timestamp::now().to_string(),
         points: count,

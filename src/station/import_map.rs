@@ -117,5 +117,5 @@ fn report(made: Lines, points: u64, imported: Imported) -> ScanReport {
     }
 }
 
-const NO_BUDGET: &str =
-    "imported: the other sensor's calibration is in no error budget, and no robot knows where its frame stands";
+const NO_BUDGET: &str = "imported: the error budget omits the other sensor's calibration; the map's frame has no known \
+                         pose in a robot's base";

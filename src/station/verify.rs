@@ -164,8 +164,8 @@ impl ObjectCheck {
         let best = l.explained_by.first().filter(|_| l.ratio > RATIO || l.misfit_sigmas > RATIO)?;
         let off: Vec<String> = best.off_by.iter().map(|(name, by)| format!("{name} by {by:+.3}")).collect();
         Some(format!(
-            "the scans of the object disagree by {:.1} times what the calibrations state; the {} explains {:.0} % of \
-             it, were it wrong in {}",
+            "the scans of the object disagree by {:.1} times the amount that the calibrations state; an error of the \
+             {} explains {:.0} % of it: {}",
             l.ratio,
             best.name,
             100.0 * best.share,

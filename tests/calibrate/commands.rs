@@ -149,7 +149,10 @@ fn a_station_is_calibrated_ranged_and_verified_by_its_commands() {
     let shaped = s.calibrate("camera", "some", &["--board", "shaped"]);
     let said = &shaped["quality"];
     let words = said["reasons"].to_string();
-    assert!(words.contains("estimated with the camera, as was asked") && !words.contains("not as drawn"), "{words}");
+    assert!(
+        words.contains("estimated with the camera, as was asked") && !words.contains("differs from its drawing"),
+        "{words}"
+    );
     let said = &said["figures"];
     assert!(said["board_off_out_of_its_plane_rms_mm"].as_f64().unwrap() < 0.05, "{said}");
     let (code, talk) = sheetlight_fails(&[

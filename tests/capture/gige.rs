@@ -312,7 +312,8 @@ fn after_an_outage_no_picture_is_paired_by_number_with_a_pose_of_before() {
         assert!(used.iter().all(|(id, stand)| *stand == Some(at(id - first))), "{used:?}");
         let rising = used.windows(2).all(|w| w[0].0 < w[1].0);
         assert!(rising && used.iter().all(|(id, _)| *id <= left), "{used:?}");
-        let told = said.iter().any(|s| s.contains("are excluded")) && stream.left_out()[0].why.contains("was gone");
+        let told =
+            said.iter().any(|s| s.contains("are excluded")) && stream.left_out()[0].why.contains("camera was lost");
         judged((), told && a.outages == 1 && a.unpaired >= BEFORE, format!("{a} {said:?}"))
     });
 }

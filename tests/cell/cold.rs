@@ -292,7 +292,7 @@ fn calibrated(cold: &Cold, what: &str, target_mm: f64) -> Option<(f64, f64, bool
                 cold.outside(),
                 cold.stood()
             );
-            let named = result.joint.quality.reasons.iter().any(|r| r.contains("the arm itself limits"));
+            let named = result.joint.quality.reasons.iter().any(|r| r.contains("the arm limits this accuracy"));
             Some((off, expected, named))
         }
         Err(e) => {

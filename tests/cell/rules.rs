@@ -151,7 +151,7 @@ fn one_confirmation_moves_once_and_only_what_was_shown() {
     let same = guard.propose(plan(vec![near])).unwrap();
     assert!(shown.passed() && shown.hash != same.hash, "each showing has its own hash");
     let mut make = |p, hash: &str| guard.make(p, Confirmation::of(hash), &mut |_, _| Ok(())).map_err(|e| e.what);
-    assert!(make(&other, &shown.hash).unwrap_err().contains("the confirmation is of"));
+    assert!(make(&other, &shown.hash).unwrap_err().contains("the confirmation belongs to"));
     assert!(make(&same, &shown.hash).is_err() && make(&shown, "").is_err());
     assert_eq!(served.cell.moves(), 0);
     make(&shown, &shown.hash).unwrap();
@@ -304,7 +304,7 @@ fn a_controller_whose_time_is_not_ours_is_halted() {
         still_ms: 5000.0,
         does: None,
         before: |_| {},
-        says: "stamps stand still or are in another unit",
+        says: "time stamps stand still or have another unit",
         within_ms: 400.0,
     };
     let stamps: [fn(&Served, &StopButton, &AtomicBool); 3] = [
@@ -417,7 +417,10 @@ fn a_figure_that_changes_is_refused_before_and_halted_on_the_way() {
     let long = leg(&mut guard, [40.0, 0.0, -40.0], 5.0);
     served.controller.turn_figure(figure ^ 4);
     let said = made(&mut guard, plan(vec![long])).unwrap_err();
-    assert!(said.contains(&format!("the figure changed on the way, from {figure} to {}", figure ^ 4)), "{said}");
+    assert!(
+        said.contains(&format!("the arm configuration changed during the motion, from {figure} to {}", figure ^ 4)),
+        "{said}"
+    );
     let halted =
         |served: &Served| served.cell.log().iter().any(|e| matches!(e.event, Event::Halt { moving: true, .. }));
     assert!(halted(&served) && guard.unknown().is_some());
@@ -431,7 +434,7 @@ fn a_figure_that_changes_is_refused_before_and_halted_on_the_way() {
     // The other program that brings the arm to the same place.
     served.controller.turned_figure();
     let said = guard.make(&shown, Confirmation::of(&*shown.hash), &mut |_, _| Ok(())).unwrap_err().what;
-    assert!(said.contains(&format!("the arm's figure is {figure}, it was {}", figure ^ 4)), "{said}");
+    assert!(said.contains(&format!("the arm configuration is {figure}; it was {}", figure ^ 4)), "{said}");
     assert_eq!(served.cell.moves(), before);
 }
 

@@ -83,7 +83,7 @@ def held(s, b, *names):
             said = b.run(PRESS)
             if said[0] == 200:
                 stalled(b, "the held button's lease ran out")
-            assert said[0] == 409 and "pressed anew" in said[1], said
+            assert said[0] == 409 and "press it again" in said[1], said
         return s.json("GET", "/motion")["silence_ms"]
     finally:
         b.let_go()

@@ -39,8 +39,8 @@ impl Clocks {
         let wrong = passed < RATE.0 * least || passed > RATE.1 * most;
         wrong.then(|| {
             format!(
-                "the controller's time went on by {:.3} s within {least:.3} to {most:.3} s, a rate of {} to {} is \
-                 allowed: its stamps stand still or are in another unit, and speed cannot be watched",
+                "the controller's clock advanced by {:.3} s in {least:.3} to {most:.3} s, a rate of {} to {} is \
+                 allowed: its time stamps stand still or have another unit, so the speed cannot be monitored",
                 passed, RATE.0, RATE.1
             )
         })

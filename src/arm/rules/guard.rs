@@ -233,17 +233,14 @@ impl Guard {
         if confirmation.hash != proposal.hash {
             let short = |h: &str| h.chars().take(12).collect::<String>();
             let what = format!(
-                "the confirmation is of {}, this motion is {}",
+                "the confirmation belongs to motion {}, but this is motion {}",
                 short(&confirmation.hash),
                 short(&proposal.hash)
             );
             return refused(what, "another pose was shown when it was given");
         }
         if self.used.contains(&proposal.hash) {
-            return refused(
-                "this confirmation was used: 1 motion was made with it, limit 1".into(),
-                "it was given once and sent twice",
-            );
+            return refused("this confirmation was already used for 1 motion, limit 1".into(), "it was sent twice");
         }
         let (age, most) = (proposal.shown.elapsed().as_secs_f64(), self.limits.as_ref().map_or(0.0, |l| l.max_shown_s));
         if age > most {
@@ -267,8 +264,8 @@ impl Guard {
             && shown != figure
         {
             return refused(
-                format!("the arm's figure is {figure}, it was {shown} when the pose was shown"),
-                "somebody moved it to the same place by another way of its joints",
+                format!("the arm configuration is {figure}; it was {shown} when the pose was shown"),
+                "somebody moved the arm to the same pose with other joint angles",
             );
         }
         let judged = self.judge(&proposal.plan, &now)?;

@@ -67,7 +67,8 @@ impl Standing {
         let arrived = mm <= ARRIVED.0 && angle.to_degrees() <= ARRIVED.1;
         (still > limit && !arrived).then(|| {
             format!(
-                "the pose has not changed for {} ms on the way, limit {}: the arm stands, or its poses do",
+                "the pose has not changed for {} ms during the motion, limit {}: the arm stopped, or the controller \
+                 repeats an old pose",
                 still.as_millis(),
                 limit.as_millis()
             )

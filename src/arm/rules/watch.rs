@@ -152,7 +152,7 @@ impl<'a> Watch<'a> {
         if let (Some(stays), Some(figure)) = (self.confirmed.figure, pose.figure)
             && stays != figure
         {
-            return Some(format!("the figure changed on the way, from {stays} to {figure}"));
+            return Some(format!("the arm configuration changed during the motion, from {stays} to {figure}"));
         }
         let leg = *self.leg.lock().unwrap_or_else(PoisonError::into_inner);
         let still = Duration::from_secs_f64(self.limits.max_still_ms * 1e-3);

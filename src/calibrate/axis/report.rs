@@ -59,8 +59,8 @@ pub fn judge(fit: &AxisFit, limits: &Limits, board_length: &str) -> Quality {
     let mut j = limits.by_error(
         expected,
         format!(
-            "a point on the axis is placed to {expected:.4} mm (1 sigma) over {over}: {own:.4} mm by direction and \
-             pitch, the rest scatters from stop to stop or bows"
+            "a point on the axis is placed to {expected:.4} mm (1 sigma) over {over}; direction and pitch cause \
+             {own:.4} mm of it, scatter from stop to stop and bow the rest"
         ),
     );
     contradictions(fit, &mut j);
@@ -126,7 +126,7 @@ impl Evidence<'_> {
         j.at_best(Verdict::Usable, partly, || {
             format!("the board was seen over {seen} of the turn: farther round the table is taken to run true")
         });
-        j.advise(partly, || format!("let the board turn by more than {seen}: put it near the axis, or tilt it less"));
+        j.advise(partly, || format!("turn the board by more than {seen}: put it closer to the axis, or tilt it less"));
         j.advise(j.verdict != Verdict::Good && camera_part > 0.7 * self.own, || {
             "calibrate the camera with more pictures first: most of the error comes from it".into()
         });
@@ -184,8 +184,8 @@ fn pitch(fit: &AxisFit, board_length: &str, j: &mut Judgement) {
     let sigma = fit.covariance[(3, 3)].max(0.0).sqrt() / stated;
     j.at_best(Verdict::BadlyDetermined, (ratio - 1.0).abs() > (4.0 * sigma).max(SCALE_TOLERANCE), || {
         format!(
-            "a {unit} of the axis is {ratio:.4} {unit} by the board: the axis states another unit, or {board_length} \
-             is wrong"
+            "the board shows {ratio:.4} {unit} for one {unit} of the axis: the axis states another unit, or \
+             {board_length} is wrong"
         )
     });
 }
@@ -226,12 +226,13 @@ fn order(fit: &AxisFit, j: &mut Judgement) {
     });
     let untold = !turned && o.reversed_mm < TOLD * o.spread_mm;
     j.at_best(Verdict::Usable, untold, || {
-        "counts in the reverse order would fit as well, because the stops lie evenly: that they count the right way \
-         round is \
-         taken from the recording"
+        "reversed counts would fit similarly well, because the stops are evenly spaced; the direction is taken from \
+         the recording"
             .into()
     });
-    j.advise(untold, || "add a stop at an uneven distance from the others: then the counts' sense is seen".into());
+    j.advise(untold, || {
+        "add a stop at an uneven distance from the others: it shows the direction of the counts".into()
+    });
 }
 
 /// The report page.

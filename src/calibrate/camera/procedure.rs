@@ -263,9 +263,8 @@ fn judge(
         let off = format!("its features are {flat:.3} mm off in its plane and {lifted:.3} mm out of it (rms)");
         if told {
             format!(
-                "the board is not as drawn: {off}; its shape was estimated with the camera, pictures that were not \
-                 solved from fit \
-                 better with it"
+                "the board differs from its drawing: {off}; its shape was estimated with the camera; pictures that \
+                 were held out fit better with it"
             )
         } else {
             format!("the board's shape was estimated with the camera, as was asked: {off}")
@@ -296,7 +295,7 @@ impl Evidence<'_> {
     fn determined(&self, j: &mut Judgement) {
         let (pictures, tilt) = (self.agreed.pictures.len(), self.tilt);
         j.at_best(Verdict::BadlyDetermined, pictures < 3, || {
-            format!("{pictures} pictures: nothing is left over to check the result with; 3 are the least, 10 the rule")
+            format!("{pictures} pictures: none is left to check the result; 3 are required, 10 recommended")
         });
         j.at_best(Verdict::Usable, (3..8).contains(&pictures), || format!("only {pictures} pictures"));
         j.at_best(Verdict::BadlyDetermined, tilt < 10.0, || {
@@ -401,9 +400,9 @@ fn held_parameters(solved: &Solved, lens: Lens) -> Option<String> {
     let names = held_names(&solved.held);
     (lens == Lens::Evidence && !names.is_empty()).then(|| {
         format!(
-            "{} held at 0: the pictures do not tell {} from 0",
+            "{} set to 0: in these pictures {} not differ from 0",
             names.join(", "),
-            if names.len() > 1 { "them" } else { "it" }
+            if names.len() > 1 { "they do" } else { "it does" }
         )
     })
 }
@@ -412,15 +411,15 @@ fn held_parameters(solved: &Solved, lens: Lens) -> Option<String> {
 fn further_parameters(solved: &Solved, lens: Lens) -> Option<String> {
     let names = further_names(&solved.held);
     (lens == Lens::Evidence && !names.is_empty())
-        .then(|| format!("{} estimated too: pictures that were not solved from fit better with them", names.join(", ")))
+        .then(|| format!("{} estimated too: pictures that were held out fit better with them", names.join(", ")))
 }
 
 /// The terms that pictures ask for and that are not believed, in words.
 fn doubted(doubt: &Doubt) -> String {
     let name: &str = doubt.lens.into();
     format!(
-        "the {name} terms are not estimated: they explain {:.3} px of the features' errors, no more than print, blur \
-         and light do. They would move the viewing rays by {:.2} px; half of that is in the stated uncertainty",
+        "the {name} terms are not estimated: they explain {:.3} px, no more than print, blur and light; they would \
+         move the viewing rays by {:.2} px, and half of that is in the uncertainty",
         doubt.explained_px, doubt.rays_px
     )
 }

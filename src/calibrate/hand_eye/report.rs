@@ -220,10 +220,14 @@ impl SolvedCamera {
     fn judge(&self, j: &mut Judgement) {
         let SolvedCamera { moved, before, after, surprise, freedom } = *self;
         if self.is_free() {
+            j.reasons.push(
+                "the camera was estimated together with the hand-eye, with its calibration as prior; the station's \
+                 camera calibration is unchanged"
+                    .into(),
+            );
             j.reasons.push(format!(
-                "the camera was solved along, its calibration as what is known beforehand: its viewing rays move by \
-                 {moved:.3} px, \
-                 known to {before:.3} px before and {after:.3} px after; the station's camera stays as it is"
+                "the camera's viewing rays moved by {moved:.3} px; their uncertainty was {before:.3} px and is now \
+                 {after:.3} px"
             ));
         }
         j.at_best(Verdict::Usable, self.is_another(), || {

@@ -186,9 +186,8 @@ fn by_arm(systematic: Option<&Systematic>, j: &mut Judgement) {
     if let Some(s) = systematic.filter(|s| s.found()) {
         j.at_best(Verdict::Usable, true, || {
             format!(
-                "the arm itself limits this: {:.0} % of its misfit at an excluded pose is predicted by the other \
-                 poses (chance: {:.0} %): its links \
-                 or joint zeros are not what its controller believes",
+                "the arm limits this accuracy: the other poses predict {:.0} % of its squared misfit at an excluded \
+                 pose (by chance: {:.0} %); its link lengths or joint zeros differ from its controller's values",
                 100.0 * s.predicted,
                 100.0 * s.by_chance.max(0.0)
             )
@@ -206,14 +205,15 @@ fn by_stops(fit: &JointFit, j: &mut Judgement) {
     // Each stop contributes three numbers of the arm's position; hand-eye and boards take six of them.
     let beyond = 3 * fit.shots.iter().filter(|s| s.robot.is_some()).count() as i64 - 6;
     j.at_best(Verdict::BadlyDetermined, beyond < LEAST_NUMBERS, || {
-        format!("{} numbers tell the robot's scatter, {LEAST_NUMBERS} are needed", beyond.max(0))
+        format!("{} degrees of freedom determine the robot's scatter, {LEAST_NUMBERS} are needed", beyond.max(0))
     });
     // An arm that scatters far less than the measured boards has little redundancy of its own. It hardly affects
     // scanned points, but its scatter is then poorly known.
     let told = fit.freedom[3];
     j.at_best(Verdict::Usable, beyond >= LEAST_NUMBERS && told < LEAST_NUMBERS as f64, || {
         format!(
-            "the robot's scatter is hardly seen beside the boards': of {beyond} numbers {told:.1} are left to tell it"
+            "the robot's scatter is small against that of the boards: only {told:.1} of {beyond} degrees of freedom \
+             determine it"
         )
     });
 }

@@ -86,8 +86,8 @@ impl Evidence<'_> {
         let used = self.used.len();
         j.at_best(Verdict::BadlyDetermined, spread < 5.0, || {
             format!(
-                "all boards are parallel to {spread:.1} degrees: an error that they share would stay unseen; 5 are \
-                 needed"
+                "all boards are parallel within {spread:.1} degrees, 5 are needed: a common error would stay \
+                 undetected"
             )
         });
         j.at_best(Verdict::Usable, (5.0..15.0).contains(&spread), || {
@@ -202,8 +202,8 @@ fn contradictions(fit: &LaserPlaneFit, views: &[StripeView], j: &mut Judgement) 
     let off = rms(fit.views.iter().filter(|v| v.used).map(|v| v.holdout_px));
     j.at_best(Verdict::BadlyDetermined, off > width, || {
         format!(
-            "predicted by the other pictures, a stripe lies {off:.2} px (rms) from its light, which is {width:.2} px \
-             wide (sigma)"
+            "the stripe predicted from the other pictures is {off:.2} px (rms) off the seen stripe, which is \
+             {width:.2} px wide (sigma)"
         )
     });
     j.at_best(Verdict::Usable, fit.scatter > SCATTER, || {
@@ -218,9 +218,8 @@ fn contradictions(fit: &LaserPlaneFit, views: &[StripeView], j: &mut Judgement) 
     for v in fit.views.iter().filter(|v| v.used && v.beside > gate) {
         j.at_best(Verdict::BadlyDetermined, true, || {
             format!(
-                "{}: its stripe lies {:.1} sigmas from where the others predict it, {:.0} are allowed, and too few \
-                 pictures \
-                 are left to do without it",
+                "{}: its stripe lies {:.1} sigmas from where the others predict it, {:.0} are allowed; too few \
+                 pictures remain to exclude it",
                 v.name,
                 v.beside.sqrt(),
                 gate.sqrt()

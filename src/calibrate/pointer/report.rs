@@ -64,8 +64,7 @@ pub fn judge(fit: &PointerFit, camera: &Intrinsics, spot_px: f64, limits: &Limit
     j.at_best(Verdict::Usable, fit.sigma_ratio > LOUD && !overruled, || loud.clone());
     j.at_best(Verdict::BadlyDetermined, fit.sigma_ratio > LOUD && overruled, || {
         format!(
-            "{loud}, {LOUD:.0} times are allowed if others are excluded: they do not agree well enough to \
-                 overrule any"
+            "{loud}; the limit is {LOUD:.0} if spots are excluded: the remaining spots agree too poorly to exclude any"
         )
     });
     j.advise(low > near + 0.25 * (far - near), || format!("show the board nearer, at about {} mm", work.depth(near)));
@@ -107,9 +106,8 @@ fn by_spots(fit: &PointerFit, used: &[&SpotResidual], work: &Volume, j: &mut Jud
     for s in used.iter().filter(|s| s.beside > gate) {
         j.at_best(Verdict::BadlyDetermined, true, || {
             format!(
-                "{}: its spot lies {:.1} sigmas from the beam of the others, {:.1} are allowed, and too few pictures \
-                 are \
-                 left to do without it",
+                "{}: its spot lies {:.1} sigmas from the beam of the others, {:.1} are allowed; too few pictures \
+                 remain to exclude it",
                 s.name,
                 s.beside.sqrt(),
                 gate.sqrt()

@@ -20,10 +20,11 @@ struct Seen {
     direction: i32,
 }
 
-const TRIGGERS: &str = "the camera was gone before it, and nothing shows that it went on counting triggers meanwhile";
-const POWER: &str =
-    "the camera was gone before it, and its clock does not show that its counter had power all the time";
-const BACK: &str = "the camera was gone before it, and its count does not go on in the direction that it had";
+const TRIGGERS: &str =
+    "the connection to the camera was lost; it is unknown whether the camera counted the triggers meanwhile";
+const POWER: &str = "the connection to the camera was lost; the camera's counter may have lost power";
+const BACK: &str =
+    "the connection to the camera was lost; the camera's count does not continue in its previous direction";
 
 impl Counting {
     /// Pairs with this table.
@@ -77,8 +78,8 @@ impl Counting {
         let by_number = matches!(self.table, Table::Rows(_) | Table::Pulses(_));
         if by_number && numbering.first > 1 {
             self.said.push(format!(
-                "the first picture has the number {}: it is taken for the first trigger's, and is not where pictures \
-                 before it were lost",
+                "the first picture has the number {} and is paired with the first row or trigger: if earlier pictures \
+                 were lost, this pairing is wrong",
                 numbering.first
             ));
         }

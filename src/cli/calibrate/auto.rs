@@ -73,7 +73,8 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let mut person = moving.person(console);
     let outputs = settings.outputs.unwrap_or_default();
     let mut cell = ArmCell::new(&mut guard, camera, outputs, &mut person, moving.speed)?;
-    let told = |stops: usize, mm: f64| console.say(format!("{stops} stops: a scanned point is expected to {mm:.4} mm"));
+    let told =
+        |stops: usize, mm: f64| console.say(format!("{stops} stops: expected error of a scanned point {mm:.4} mm"));
     let result = calibrate_auto(&mut cell, &rig, &run, &told).inspect_err(|_| {
         if args.out.join("line/meta.json").is_file() {
             let (out, station) = (args.out.display(), moving.station.display());

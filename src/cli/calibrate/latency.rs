@@ -51,8 +51,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let (l, b) = (&found.latency, &found.beyond);
     let speeds: Vec<String> = b.speeds.iter().map(|v| format!("{v:.1}")).collect();
     let text = format!(
-        "pictures are {:.3} ms late, sigma {:.3} ms ({:.3} ms beyond what was taken for it)\n\
-         {} shots in {} passes at {} mm/s; their heights were {:.4} mm apart, are {:.4} mm",
+        "the pictures are {:.3} ms late, sigma {:.3} ms ({:+.3} ms against the delay assumed so far)\n\
+         {} shots in {} passes at {} mm/s; their heights differed by {:.4} mm before the correction, and by {:.4} mm \
+         after it",
         l.delay_ms,
         l.sigma_ms,
         1e3 * b.seconds,

@@ -39,7 +39,7 @@ pub struct Args {
     /// Station folder, for its latency
     #[arg(long)]
     station: Option<PathBuf>,
-    /// Folder for the recording; must not hold one
+    /// Folder for the recording; must not contain a recording
     #[arg(long)]
     out: PathBuf,
     /// Pictures of: line (the stripe), pointer (its spot) or room (a board, lasers off)

@@ -14,8 +14,8 @@ use std::path::PathBuf;
 /// floats of 16, 32 and 64 bits), PNG, PGM and BMP. It also reads clouds: PLY (text, binary) and PCD (text, binary,
 /// compressed). What the file states about its levels (orientation, missing level, scale, transparency) is honoured.
 /// Units, distances and the missing level are stated and never guessed. The scatter of heights is measured unless
-/// stated. The result is a scan folder with cloud, height map and scan.json. Its frame is called map: poses of find
-/// are in it, not in a robot's base, and no calibration enters their error budget.
+/// stated. The result is a scan folder with cloud, height map and scan.json. Its frame is called map. The poses of
+/// find are in this frame, not in a robot's base. Their error budget contains no calibration.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight import-map plate.png --unit-mm 0.02 --spacing-mm 0.216,0.209 --missing 0 \\
@@ -31,7 +31,7 @@ pub struct Args {
     /// mm per level of a picture, or per unit of a cloud's coordinates: 1 for mm, 1000 for m
     #[arg(long, value_name = "MM")]
     unit_mm: Option<f64>,
-    /// Distance of columns and of rows, mm; for a cloud without lines, of its points
+    /// Spacing of columns and of rows, mm; for an unordered cloud, of its points
     #[arg(long, value_name = "X,Y", value_parser = numbers::<2>)]
     spacing_mm: Option<[f64; 2]>,
     /// Height of a picture's level 0, mm

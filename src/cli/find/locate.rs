@@ -215,11 +215,11 @@ pub fn looks(l: &Disagreement) -> String {
     for e in &l.explained_by {
         let off: Vec<String> = e.off_by.iter().map(|(name, by)| format!("{name} {by:+.3}")).collect();
         s += &format!(
-            "  {:16} would explain {:.0} % of it, were it wrong by {}; wrong by {:.0} of its sigmas it could go \
-             unnoticed and move the part by {} mm\n",
+            "  {:16} an error of {} would explain {:.0} % of the disagreement; an error of {:.0} sigmas could remain \
+             undetected and move the part by up to {} mm\n",
             e.name,
-            100.0 * e.share,
             off.join(", "),
+            100.0 * e.share,
             e.unnoticed_sigmas,
             row(&e.unseen_mm, 3)
         );

@@ -46,7 +46,7 @@ pub struct Args {
     /// Only matches with their middle in this polygon: its corners, px
     #[arg(long, value_name = "X,Y,X,Y,...", value_delimiter = ',', allow_hyphen_values = true)]
     polygon: Vec<f64>,
-    /// Turns against the template, degrees; equal values: it does not turn [default: all]
+    /// Turns against the template, degrees; two equal values fix the turn [default: all]
     #[arg(long, value_name = "LO..HI", value_parser = range, allow_hyphen_values = true)]
     angles: Option<[f64; 2]>,
     /// Sizes against the template's [default: 1..1]

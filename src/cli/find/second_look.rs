@@ -93,7 +93,7 @@ fn summary(
             s += &format!("{name:12} {}\n", numbers.join(" "));
         }
     }
-    s += "how much of an error shows between the looks, of what it makes in the pose\n";
+    s += "share of each parameter's pose error that shows as a difference between the scans\n";
     for shown in &plan.shown {
         s += &format!("  {:12} {:10} {:4.0} %\n", shown.calibration, shown.parameter, 100.0 * shown.share);
     }

@@ -231,8 +231,10 @@ fn right_way_round(
     };
     let mut note = |t: &TurnVote, say: usize, of: &TurnVote| {
         let all = of.votes_for + of.votes_against;
-        notes
-            .push(format!("turned by {:.0} degrees: {say} of {all} points where the turns differ say so", t.rival_deg));
+        notes.push(format!(
+            "turned by {:.0} degrees: {say} of the {all} points that distinguish the turns support it",
+            t.rival_deg
+        ));
     };
     let turns = votes(&measured);
     if let Some(t) = turns.iter().find(|t| t.told() == Some(false)) {

@@ -155,8 +155,8 @@ fn said(says: &Says, [dx, dy]: [f64; 2], stated: &Stated, notes: &mut Vec<String
     }
     if says.orientation.is_some() && stated.rows_up {
         notes.push(
-            "--rows-up came on top of the file's orientation, which was obeyed already: leave it out if rows counted \
-             from the bottom were the reason"
+            "the file's orientation was applied, and --rows-up in addition: omit --rows-up if it was meant to apply \
+             that orientation"
                 .into(),
         );
     }

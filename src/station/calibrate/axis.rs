@@ -93,7 +93,7 @@ fn one_origin(found: &mut [(f64, FrameBoard)]) -> Option<String> {
         found[i].1.pose.camera_from_board = nearest.expect("one turn or more");
     }
     Some(format!(
-        "the board looks the same after {} turns: it is taken to turn by less than {} degrees from stop to stop",
+        "the board looks the same in {} orientations: it is assumed to turn by less than {} degrees between stops",
         all.len(),
         180 / all.len()
     ))

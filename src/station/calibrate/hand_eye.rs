@@ -103,8 +103,8 @@ pub fn calibrate_hand_eye(
     notes.extend(one_origin(&mut pairs, &seen.found, run.solver.seed)?);
     if again > 0 {
         notes.push(format!(
-            "{again} of these pictures are among those that the camera was calibrated with: what they say of it \
-             counts once"
+            "{again} of these pictures were also used to calibrate the camera: their information about it is used only \
+             once"
         ));
     }
     let pose_name = run.poses.clone().or(recording.meta.pose_file.clone()).unwrap_or_default();

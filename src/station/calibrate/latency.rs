@@ -113,7 +113,8 @@ fn pairing(recording: &Recording) -> Result<(Vec<Option<Slip>>, f64)> {
     }
     let former: Vec<f64> = taken.iter().filter_map(|t| t.and_then(|t| t.delay_ns)).collect();
     if former.iter().any(|d| *d != former[0]) {
-        return Err(Fault::input("its shots were taken with several delays in mind").next("record again in one go"));
+        return Err(Fault::input("its shots were recorded with different delays")
+            .next("record all passes again with one delay"));
     }
     Ok((rates, former.first().copied().unwrap_or(0.0)))
 }

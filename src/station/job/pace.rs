@@ -51,7 +51,7 @@ pub fn pace(step_mm: f64, speed_mm_s: Option<f64>, length_mm: f64, can: &Can) ->
     let bears: Vec<(&'static str, f64)> = all.into_iter().flatten().collect();
     let least = bears.iter().min_by(|a, b| a.1.total_cmp(&b.1)).copied();
     let speed = speed_mm_s.or(least.map(|l| l.1)).ok_or_else(|| {
-        Fault::usage("neither a speed nor anything that limits it is known")
+        Fault::usage("no speed and no limit of the speed is known")
             .cause("no camera that says its rate, no scan that was measured here, no [motion] in station.toml")
             .next("state a speed, mm/s, or the camera's rate, pictures a second")
     })?;
@@ -76,10 +76,10 @@ impl Pace {
             self.speed_mm_s, self.step_mm, self.rate_hz, self.seconds
         );
         if let Some(by) = self.limited_by {
-            said += &format!("; the {by} allows no more");
+            said += &format!("; limited by the {}", if by == "speed" { "limit of speed" } else { by });
         }
         if self.left_step_mm > 1.000_001 * self.step_mm {
-            said += &format!(": {:.3} mm a shot are left", self.left_step_mm);
+            said += &format!(": actual spacing {:.3} mm a shot", self.left_step_mm);
         }
         said
     }
@@ -101,7 +101,7 @@ mod tests {
         // Faster than the camera allows: the resulting steps are longer.
         let fast = pace(0.2, Some(12.0), 60.0, &can).unwrap();
         assert_eq!((fast.limited_by, fast.left_step_mm), (Some("camera"), 0.4));
-        assert!(fast.words().contains("the camera allows no more: 0.400 mm a shot are left"), "{}", fast.words());
+        assert!(fast.words().contains("limited by the camera: actual spacing 0.400 mm a shot"), "{}", fast.words());
         let slow_chain = Can { chain_hz: Some(10.0), ..can };
         assert_eq!(pace(0.2, None, 60.0, &slow_chain).unwrap().limited_by, Some("chain"));
         assert!(pace(0.2, None, 60.0, &Can::default()).unwrap_err().what.contains("known"));

@@ -61,8 +61,10 @@ impl JobReport {
     pub fn next(&self) -> &'static str {
         match self.resumes {
             Resumes::Over => "look at the cell, then begin a new job",
-            Resumes::Up => "look at the cell; resumed it goes back up, nothing else",
-            Resumes::On | Resumes::Anew => "look at the cell; resumed it measures again, backed out of it goes back up",
+            Resumes::Up => "look at the cell; resuming only moves the arm back up",
+            Resumes::On | Resumes::Anew => {
+                "look at the cell; resuming measures again, backing out moves the arm back up"
+            }
         }
     }
 }

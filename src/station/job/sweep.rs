@@ -254,7 +254,7 @@ fn stripe(plane: &Plane<Camera>, depth: f64, field: &[f64; 4]) -> Result<[f64; 2
         "at {depth:.0} mm the line lies {:.1} mm beside the picture's middle, out of the picture",
         from.norm()
     ))
-    .cause("sheet and picture do not meet in the working volume, or the laser plane belongs to another rig")
+    .cause("in the working volume the laser plane is outside the picture, or it belongs to another rig")
     .next("state [working_volume] in station.toml where the line is seen, or calibrate the laser plane"))
 }
 

@@ -127,14 +127,13 @@ impl Seen {
             )
         } else if apart {
             (
-                "the light lies where the laser plane is not within the working volume",
+                "the light is outside the part of the picture where the laser plane is expected",
                 "compare working_volume in station.toml and the laser plane with the station; is the picture \
                  mirrored or turned?",
             )
         } else {
             (
-                "what light there is makes no stripe as the settings ask for: too wide, too faint, or broken into \
-                 specks",
+                "the light does not form a stripe within the settings: too wide, too faint, or broken into spots",
                 "look at the overlays, then at [extraction] in station.toml",
             )
         }

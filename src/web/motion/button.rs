@@ -40,7 +40,7 @@ impl Desk {
         let asked = self.may(&at, tab, what)?;
         let down = at.hold.as_ref().is_some_and(|h| h.heard.elapsed() < SILENCE);
         if down && !asked.stays_down {
-            return Err(no(format!("'{}' wants the button pressed anew", asked.step)));
+            return Err(no(format!("'{}': the button is still held; release it and press it again", asked.step)));
         }
         Ok(self.grants.give(tab, what.clone()))
     }

@@ -97,7 +97,11 @@ fn an_arm_too_exact_to_be_seen_is_no_reason_to_refuse() {
             let ([off, sigma], quality, fit) = judged(robot_mm, 30, seed);
             let hidden = fit.freedom[3] < 6.0;
             assert!(quality.verdict <= Verdict::Usable, "{quality:?}");
-            assert_eq!(hidden, quality.reasons.iter().any(|r| r.contains("hardly seen")), "{quality:?}");
+            assert_eq!(
+                hidden,
+                quality.reasons.iter().any(|r| r.contains("is small against that of the boards")),
+                "{quality:?}"
+            );
             assert!(!hidden || quality.verdict == Verdict::Usable, "{quality:?}");
             (off / sigma, hidden)
         };

@@ -42,7 +42,10 @@ impl Apart {
     /// Reason for excluding a single picture.
     pub fn reason(&self) -> String {
         let [is, then] = self.misfit_px;
-        format!("it fits the others' camera to {is:.2} px, and to {then:.2} px if it is {}; {}", self.how, self.cause)
+        format!(
+            "its misfit to the others' camera is {is:.2} px, and {then:.2} px if it is {}; {}",
+            self.how, self.cause
+        )
     }
 
     /// Fault of a set that cannot be used.
@@ -54,13 +57,13 @@ impl Apart {
         let half = if 2 * count == all { "; or the others were, and these are right" } else { "" };
         let [is, then] = self.misfit_px;
         Fault::input(format!(
-            "{count} of {all} pictures are not of the camera as the others show it: they fit it to {is:.2} px, and to \
+            "{count} of {all} pictures do not fit the other pictures' camera: the misfit is {is:.2} px, and \
              {then:.2} px if they are {}: {}{more}{half}",
             self.how,
             named.join(", ")
         ))
         .cause(self.cause)
-        .next("calibrate from pictures that were taken in one way: leave these out, or turn them back, and try again")
+        .next("exclude these pictures or turn them back, then calibrate again")
     }
 }
 

@@ -32,12 +32,15 @@ pub struct PathFound {
     pub taken_out: bool,
 }
 
+/// What is said of a share that was not removed.
+const KEPT: &str = "the poses were kept as reported";
+
 impl std::fmt::Display for PathFound {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         let PathFound { height_mm, roll_deg, share, share_sigma, taken_out } = self;
-        write!(f, "reported places scatter by {height_mm:.4} mm and {roll_deg:.4} degrees about a smooth path; ")?;
-        write!(f, "the surface does not follow {:.1} +- {:.1} % of it", 100.0 * share, 100.0 * share_sigma)?;
-        f.write_str(if *taken_out { ", which is taken out" } else { ": left as reported" })
+        write!(f, "The reported poses scatter about a smooth path by {height_mm:.4} mm in height and ")?;
+        write!(f, "{roll_deg:.4} degrees in roll. {:.1} +- {:.1} % of this ", 100.0 * share, 100.0 * share_sigma)?;
+        write!(f, "scatter does not appear in the surface; {}.", if *taken_out { "it was removed" } else { KEPT })
     }
 }
 

@@ -48,11 +48,11 @@ impl std::fmt::Display for SheetFound {
         let SheetFound { thickness_mm, thickness_sigma_mm, scatter_mm, moved } = self;
         write!(
             f,
-            "where brightness changes the sheet acts as one of {thickness_mm:.3} +- {thickness_sigma_mm:.3} mm (1 \
-             sigma): "
+            "Changes of brightness shift points like a laser sheet of {thickness_mm:.3} +- {thickness_sigma_mm:.3} mm \
+             (1 sigma). "
         )?;
-        write!(f, "taken out, of {:.1} % of the points more than their standard deviation; ", 100.0 * moved)?;
-        write!(f, "what is left scatters as one of {scatter_mm:.3} mm pulls, which is in the points' sigma")
+        write!(f, "This shift was removed; for {:.1} % of the points it exceeded their sigma. ", 100.0 * moved)?;
+        write!(f, "The remaining scatter equals that of a {scatter_mm:.3} mm sheet; the points' sigma contains it.")
     }
 }
 

@@ -98,7 +98,9 @@ pub fn calibrate_auto(cell: &mut dyn Cell, rig: &Rig, run: &AutoRun, told: &dyn 
     // The calibration remains valid if the arm does not return.
     let stranded = match session.home() {
         Ok(true) => None,
-        Ok(false) => Some("none of the places that it came by is reached straight: jog it back joint by joint".into()),
+        Ok(false) => {
+            Some("it cannot reach any of its earlier poses in a straight line; jog it back joint by joint".into())
+        }
         Err(e) => Some(e.what),
     };
     let mut result = AutoResult { joint, expected_mm: expected, stops, ended, check };
@@ -259,8 +261,8 @@ impl<'a> Session<'a> {
         self.refused.push(to);
         self.stuck += 1;
         if self.stuck >= STUCK {
-            return Err(Fault::refused(format!("the controller would not begin {STUCK} moves in a row: {why}"))
-                .cause("straight ways from here lead through places that the arm cannot pass")
+            return Err(Fault::refused(format!("the controller refused {STUCK} moves in a row: {why}"))
+                .cause("straight motions from here pass through poses that the arm cannot reach")
                 .next("jog the robot to where its wrist is bent, the board in view, and begin again"));
         }
         if self.stuck.is_multiple_of(BACK) { self.home().map(drop) } else { Ok(()) }

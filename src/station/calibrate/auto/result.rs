@@ -39,13 +39,13 @@ impl AutoResult {
     /// Adds the findings of the check and of the end to every record.
     pub(super) fn judge(&mut self, run: &AutoRun, stranded: Option<String>) {
         let mut reasons: Vec<String> =
-            stranded.into_iter().map(|why| format!("the arm did not go back to where it began: {why}")).collect();
+            stranded.into_iter().map(|why| format!("the arm did not return to its first pose: {why}")).collect();
         let mut worst = Verdict::Good;
         let last = self.expected_mm.last().copied().unwrap_or(f64::INFINITY);
         if last > run.target_mm {
             let why = match self.ended {
-                Ended::Stalled => "more stops lower it no further",
-                Ended::NoPose => "no other pose from which the board is seen may be gone to",
+                Ended::Stalled => "more stops do not lower the error",
+                Ended::NoPose => "no other allowed pose sees the board",
                 _ => "no more stops are allowed",
             };
             reasons.push(format!("the target of {} mm is not reached ({last:.4} mm): {why}", run.target_mm));
@@ -59,12 +59,12 @@ impl AutoResult {
                 ));
                 if c.off_mm > 2.0 * c.expected_mm {
                     worst = Verdict::Usable;
-                    reasons.push("that is more than twice what was expected: something is not in the model".into());
+                    reasons.push("the error is more than twice the expected one: the model misses a cause".into());
                 }
             }
             None => {
                 worst = Verdict::Usable;
-                reasons.push("it is not checked: no further pose may be gone to".into());
+                reasons.push("the result is not checked: no further pose is allowed".into());
             }
         }
         self.joint.remark(worst, &reasons);

@@ -1,11 +1,11 @@
 // The only table of texts: English, then German, Chinese, Japanese.
 
 export const TABLE = {
-  "1280×960 is twice the resolution of 640×480. Other machines as they were recorded with one clean stripe.":
+  "1280×960 is twice the resolution of 640×480. Other machines were measured earlier, with one clean stripe.":
     [
-      "1280×960 ist die doppelte Auflösung von 640×480. Andere Maschinen: mit einem sauberen Streifen gemessen.",
-      "1280×960 是 640×480 的两倍分辨率。其他机器为单条干净激光线下的记录值。",
-      "1280×960 は 640×480 の倍の解像度。他の機械はきれいな一本線での記録値です。"
+      "1280×960 ist die doppelte Auflösung von 640×480. Andere Maschinen: früher mit einem sauberen Streifen gemessen.",
+      "1280×960 是 640×480 的两倍分辨率。其他机器为先前以单条干净激光线测得。",
+      "1280×960 は 640×480 の倍の解像度です。他の機械は以前、きれいな一本線で測定しました。"
     ],
   "68 % within": ["68 % innerhalb", "68 % 在此范围内", "68 % がこの範囲内"],
   "A camera of": ["Eine Kamera mit", "相机", "カメラ"],
@@ -15,10 +15,10 @@ export const TABLE = {
       "工作站就是它的文件夹：设置、标定、配方和任务。请在程序结束后复制。",
       "ステーションはフォルダーそのものです：設定、校正、レシピ、ジョブ。プログラム終了中にコピーしてください。"
     ],
-  "A sweep needs camera, laser plane and hand-eye, calibrated.": [
+  "A sweep needs calibrations of camera, laser plane and hand-eye.": [
     "Eine Abtastfahrt braucht die Kalibrierungen von Kamera, Laserebene und Hand-Auge.",
-    "扫掠需要已标定的相机、激光平面和手眼。",
-    "走査には校正済みのカメラ、レーザー平面、ハンドアイが必要です。"
+    "扫掠需要相机、激光平面和手眼的标定。",
+    "走査にはカメラ、レーザー平面、ハンドアイの校正が必要です。"
   ],
   "A term is not known: the sum is a lower bound.": [
     "Ein Beitrag ist nicht bekannt: Die Summe ist eine untere Grenze.",
@@ -45,8 +45,8 @@ export const TABLE = {
   "Arm": ["Scharf schalten", "使能", "有効にする"],
   "Actual spacing at this speed": [
     "Tatsächlicher Bildabstand bei dieser Geschwindigkeit",
-    "此速度下剩余",
-    "この速度で残るのは"
+    "此速度下的实际间距",
+    "この速度での実際の間隔"
   ],
   "Axis": ["Achse", "轴", "軸"],
   "Back out": ["Zurückziehen", "退出", "後退する"],
@@ -54,8 +54,8 @@ export const TABLE = {
   "Backed up.": ["Gesichert.", "已备份。", "バックアップしました。"],
   "Backup": ["Sicherung", "备份", "バックアップ"],
   "Batch and repeats": ["Reihe und Wiederholungen", "批处理与重复", "一括と繰り返し"],
-  "Tolerance": ["Toleranz", "允许", "許容"],
-  "Tolerance, degrees": ["Toleranz, Grad", "允许角度", "許容角度"],
+  "Tolerance": ["Toleranz", "公差", "許容差"],
+  "Tolerance, degrees": ["Toleranz, Grad", "公差，度", "許容差、度"],
   "Benchmark": ["Leistung messen", "性能测试", "ベンチマーク"],
   "Board": ["Tafel", "标定板", "ボード"],
   "Both": ["Beides", "两者", "両方"],
@@ -93,10 +93,10 @@ export const TABLE = {
   "Construct": ["Konstruieren", "构造", "構成する"],
   "Constructed points": ["Konstruierte Punkte", "构造点", "構成点"],
   "Contrast": ["Kontrast", "对比度", "コントラスト"],
-  "Counted here, of a camera of": [
-    "Hier gezählt, von einer Kamera mit",
-    "本机实测，相机为",
-    "ここで数えた値、カメラは"
+  "Measured on this machine with a camera of": [
+    "Auf dieser Maschine gemessen, mit einer Kamera mit",
+    "在本机实测，相机为",
+    "この機械で測定、カメラは"
   ],
   "Counters": ["Zähler", "计数", "カウンター"],
   "Covered": ["Abgedeckt", "覆盖", "被覆"],
@@ -122,19 +122,19 @@ export const TABLE = {
   ],
   "Draw a box around a window": ["Rahmen um ein Fenster ziehen", "框出窗口", "窓を囲む"],
   "Draw a box around the body": ["Rahmen um den Körper ziehen", "框出零件本体", "本体を囲む"],
-  "Draw a box around what goes": [
-    "Kasten um das ziehen, was wegfällt",
-    "框出要去除的部分",
-    "除く部分を枠で囲む"
+  "Draw a box around the area to remove": [
+    "Rahmen um den Bereich ziehen, der entfernt wird",
+    "框出要移除的区域",
+    "除去する範囲を枠で囲む"
   ],
-  "Draw a box around what stays": [
-    "Kasten um das ziehen, was bleibt",
-    "框出要保留的部分",
-    "残す部分を枠で囲む"
+  "Draw a box around the area to keep": [
+    "Rahmen um den Bereich ziehen, der bleibt",
+    "框出要保留的区域",
+    "残す範囲を枠で囲む"
   ],
   "Draw a box over the plane": ["Rahmen über die Ebene ziehen", "框出平面", "平面を囲む"],
   "Each motion is shown here and waits for the held button.": [
-    "Jede Bewegung wird hier gezeigt und wartet auf den gehaltenen Knopf.",
+    "Jede Bewegung wird hier gezeigt und wartet auf die gehaltene Taste.",
     "每个动作都在此显示，并等待按住按钮。",
     "各動作はここに表示され、ボタンの長押しを待ちます。"
   ],
@@ -221,20 +221,20 @@ export const TABLE = {
   ],
   "How the stripe is found": ["Wie der Streifen gefunden wird", "条纹提取设置", "ラインの検出設定"],
   "I have looked": ["Ich habe nachgesehen", "我已查看", "確認しました"],
-  "In the scan's frame, against the median; only where the part stood still between the recordings.":
+  "Deviation from the median, in the scan's frame. It is valid only if the part did not move between recordings.":
     [
-      "Im Koordinatensystem des Scans, gegen den Median; nur wenn das Teil zwischen den Aufnahmen stillstand.",
-      "在扫描坐标系中，相对中位数；仅适用于录制间零件静止时。",
-      "走査の座標系で中央値に対して。記録の間に部品が動いていない場合のみ。"
+      "Abweichung vom Median, im Koordinatensystem des Scans. Gilt nur, wenn das Teil zwischen Aufnahmen stillstand.",
+      "相对中位数的偏差，在扫描坐标系中。仅当零件在各次录制之间未移动时有效。",
+      "走査の座標系での中央値からの偏差。記録の間に部品が動いていない場合にのみ有効です。"
     ],
   "Insert a part": ["Teil einsetzen", "插入零件", "部品を挿入"],
   "Insertion": ["Einsetzen", "插入", "挿入"],
   "Intensity": ["Helligkeit", "强度", "輝度"],
   "Islands": ["Inseln", "孤立块", "孤立片"],
-  "It moves while the button is held, to what is shown, once. Let go to halt.": [
-    "Er bewegt sich, solange der Knopf gehalten wird, zum Gezeigten, einmal. Loslassen hält an.",
-    "按住按钮时移动到所示位置，仅一次。松开即停。",
-    "ボタンを押している間、表示された所へ一度だけ動きます。離すと止まります。"
+  "The arm makes the shown motion once, while the button is held. Releasing the button halts it.": [
+    "Der Arm führt die gezeigte Bewegung einmal aus, solange die Taste gehalten wird. Loslassen hält ihn an.",
+    "按住按钮时，机械臂执行一次所示动作。松开按钮即停。",
+    "ボタンを押している間、アームは表示された動作を一度だけ行います。離すと止まります。"
   ],
   "Job": ["Auftrag", "任务", "ジョブ"],
   "Jobs": ["Aufträge", "任务", "ジョブ"],
@@ -254,9 +254,9 @@ export const TABLE = {
       "レーザーと照明は 1.5 秒間。レーザーを見ないこと。グリッパー以外は動きません。"
     ],
   "Lattice": ["Gitter", "点阵", "格子点"],
-  "Layer": ["Ebene", "图层", "レイヤー"],
+  "Layer": ["Schicht", "图层", "レイヤー"],
   "Leaned": ["Geneigt", "倾斜", "傾き"],
-  "Exclude": ["Weglassen", "排除", "除外"],
+  "Exclude": ["Ausschließen", "排除", "除外"],
   "Length": ["Länge", "长度", "長さ"],
   "Levels": ["Grauwerte", "灰度", "輝度値"],
   "Likely cause": ["Wahrscheinliche Ursache", "可能原因", "考えられる原因"],
@@ -270,19 +270,19 @@ export const TABLE = {
     "ロボットを確認してください。"
   ],
   "Look at the surface": ["Oberfläche ansehen", "查看表面", "表面を見る"],
-  "Look on; operate, one at a time; everybody stops": [
-    "Zusehen; bedienen, immer nur einer; anhalten darf jeder",
-    "观看；操作（一次一人）；任何人都可停止",
-    "閲覧。操作は一人ずつ。停止は誰でも"
+  "Everybody may watch and stop. One person at a time may operate.": [
+    "Zusehen und anhalten darf jeder. Bedienen darf immer nur einer.",
+    "任何人都可观看和停止。每次只能一人操作。",
+    "閲覧と停止は誰でもできます。操作は一人ずつです。"
   ],
   "Number of turns that look alike": [
     "Zahl der Drehlagen, die gleich aussehen",
-    "旋转多少次看起来相同",
-    "この回数の回転で同じに見える"
+    "看起来相同的旋转位置数",
+    "同じに見える回転位置の数"
   ],
   "Make the recipe": ["Rezept erstellen", "生成配方", "レシピを作成"],
   "Map": ["Karte", "地图", "マップ"],
-  "May": ["Darf", "可以", "できること"],
+  "Permission": ["Berechtigung", "权限", "権限"],
   "Measure": ["Messen", "测量", "測定"],
   "Measured": ["Gemessen", "测量结果", "測定結果"],
   "Midpoint": ["Mitte", "中点", "中点"],
@@ -302,7 +302,7 @@ export const TABLE = {
       "未设置运动限值：不会移动。限值是下方 station.toml 中的 [motion] 表。",
       "動作制限が未設定なので何も動きません。下の station.toml の [motion] 表で設定します。"
     ],
-  "No more than this allows": ["Mehr erlaubt nicht", "受限于", "これ以上を許さないもの"],
+  "Limited by": ["Begrenzt durch", "受限于", "制限の要因"],
   "No motion waits for a confirmation.": [
     "Keine Bewegung wartet auf eine Bestätigung.",
     "没有等待确认的动作。",
@@ -333,19 +333,19 @@ export const TABLE = {
     "此图像中看不到激光线。",
     "この画像にはレーザー線が見えません。"
   ],
-  "Nobody: started without leave to move": [
-    "Niemand: ohne Erlaubnis zur Bewegung gestartet",
-    "无人：启动时未允许移动",
-    "なし：動作許可なしで起動"
+  "Nobody: the program was started without --allow-motion": [
+    "Niemand: Das Programm wurde ohne --allow-motion gestartet",
+    "无人：程序启动时未带 --allow-motion",
+    "なし：--allow-motion なしで起動されました"
   ],
   "Not used": ["Nicht benutzt", "未使用", "未使用"],
   "Notation": ["Schreibweise", "表示法", "表記"],
   "Notation and limits": ["Schreibweise und Grenzen", "表示法和限值", "表記と制限"],
   "Notes": ["Hinweise", "说明", "注記"],
-  "Nothing that is known limits it.": [
-    "Nichts Bekanntes begrenzt es.",
-    "没有已知的限制。",
-    "分かる範囲で制限はありません。"
+  "No known limit is reached.": [
+    "Keine bekannte Grenze ist erreicht.",
+    "未达到任何已知的限制。",
+    "既知の制限には達していません。"
   ],
   "Nothing was checked yet.": ["Noch nichts geprüft.", "尚未检查。", "まだ点検していません。"],
   "Nothing was measured along this line.": [
@@ -354,20 +354,20 @@ export const TABLE = {
     "この線上に測定値がありません。"
   ],
   "Nothing was scanned yet.": ["Noch nichts gescannt.", "尚未扫描。", "まだスキャンしていません。"],
-  "Nothing: served to this machine alone": [
-    "Nichts: nur für diese Maschine",
-    "无：仅供本机",
-    "なし：この機械のみ"
+  "No access: the screen serves only this machine": [
+    "Kein Zugriff: Der Bildschirm ist nur für diese Maschine",
+    "无访问权限：界面仅供本机",
+    "アクセス不可：画面はこの機械のみ"
   ],
   "Now the point": ["Nun der Punkt", "现在选点", "次に点を選択"],
   "Of": ["Von", "取自", "元"],
   "Offset": ["Versatz", "偏移", "オフセット"],
   "Old against new": ["Alt gegen neu", "新旧对比", "新旧比較"],
   "On": ["Auf", "运行于", "実行先"],
-  "One pin, then another: the tool goes where their middle says": [
-    "Ein Stift, dann ein anderer: Das Werkzeug fährt dorthin, wo ihre Mitte es sagt",
-    "先点一个针脚，再点另一个：工具按其中点定位",
-    "ピンを 2 本順に指すと、その中点に工具を合わせます"
+  "Point at two pins: their midpoint sets the tool's position": [
+    "Auf zwei Stifte zeigen: Ihre Mitte bestimmt die Position des Werkzeugs",
+    "依次指向两个针脚：其中点决定工具位置",
+    "ピンを 2 本指すと、その中点が工具の位置になります"
   ],
   "Only watch": ["Nur zusehen", "仅观看", "閲覧のみ"],
   "Open": ["Öffnen", "打开", "開く"],
@@ -385,11 +385,12 @@ export const TABLE = {
     "次回の設定変更"
   ],
   "Outline": ["Umriss", "轮廓", "外形"],
-  "Outlines: where the part was found, as this camera should see it. Beside the part: do not go.": [
-    "Umrisse: wo das Teil gefunden wurde, wie diese Kamera es sehen müsste. Liegen sie daneben: nicht fahren.",
-    "轮廓：找到的零件在此相机中应处的位置。若偏离零件，请勿移动。",
-    "輪郭：見つかった部品がこのカメラで見えるはずの位置。部品からずれていたら動かさないこと。"
-  ],
+  "The outlines show where this camera should see the part. If they lie beside it, do not move the arm.":
+    [
+      "Die Umrisse zeigen, wo diese Kamera das Teil sehen müsste. Liegen sie daneben: den Arm nicht bewegen.",
+      "轮廓表示此相机应看到零件的位置。若轮廓偏离零件，请勿移动机械臂。",
+      "輪郭は、部品がこのカメラに見えるはずの位置を示します。部品からずれている場合はアームを動かさないでください。"
+    ],
   "Output of the gripper": ["Ausgang des Greifers", "夹爪输出", "グリッパーの出力"],
   "Output of the lamp": ["Ausgang der Lampe", "灯的输出", "照明の出力"],
   "Output of the line laser": ["Ausgang des Linienlasers", "线激光输出", "ラインレーザーの出力"],
@@ -430,13 +431,17 @@ export const TABLE = {
   "Pose": ["Pose", "位姿", "姿勢"],
   "Poses are written as": ["Posen werden geschrieben als", "位姿表示法", "姿勢の表記"],
   "Position": ["Position", "位置", "位置"],
-  "Press a picture to leave it out, then calibrate again.": [
-    "Bild drücken, um es wegzulassen, dann neu kalibrieren.",
+  "Press a picture to exclude it, then calibrate again.": [
+    "Bild drücken, um es auszuschließen, dann neu kalibrieren.",
     "点击图像将其排除，然后重新标定。",
     "画像を押して除外し、再校正します。"
   ],
   "Progress": ["Fortschritt", "进度", "進捗"],
-  "Propose square pose": ["Senkrechte Lage vorschlagen", "建议垂直位姿", "直角姿勢を提案"],
+  "Compute the perpendicular pose": [
+    "Pose senkrecht zur Fläche berechnen",
+    "计算垂直位姿",
+    "面に垂直な姿勢を計算"
+  ],
   "Put the board's description into the station's folder boards.": [
     "Legen Sie die Beschreibung der Tafel in den Ordner boards der Station.",
     "请把标定板的描述放入工作站的 boards 文件夹。",
@@ -447,17 +452,17 @@ export const TABLE = {
   "Really restore?": ["Wirklich wiederherstellen?", "确定恢复？", "本当に復元しますか？"],
   "Recipe": ["Rezept", "配方", "レシピ"],
   "Recipe as text": ["Rezept als Text", "配方文本", "レシピ本文"],
-  "Estimated from shot time for a camera at": [
-    "Aus der Zeit je Bild berechnet, für eine Kamera mit",
+  "Estimated from the time per shot, for a camera of": [
+    "Aus der Zeit je Bild geschätzt, für eine Kamera mit",
     "按每帧用时推算，相机为",
-    "1ショットの時間から計算、カメラは"
+    "1ショットの時間から推定、カメラは"
   ],
   "Recording": ["Aufnahme", "录制", "記録"],
   "Recording of the pointer": ["Aufnahme des Zeigers", "指针录制", "ポインターの記録"],
   "Recordings": ["Aufnahmen", "录制", "記録"],
   "Recordings that are solved together.": [
     "Aufnahmen, die zusammen gelöst werden.",
-    "一起求解的记录。",
+    "一起求解的录制。",
     "まとめて解く記録。"
   ],
   "Reduce": ["Verkleinern", "缩小", "縮小"],
@@ -472,13 +477,14 @@ export const TABLE = {
   ],
   "Result": ["Ergebnis", "结果", "結果"],
   "Resume": ["Fortsetzen", "继续", "再開"],
-  "Resumed before the part it measures anew, at the part it goes back up.": [
-    "Fortgesetzt misst er vor dem Teil neu, am Teil fährt er zurück nach oben.",
-    "继续后：到达零件之前重新测量，在零件处则退回上方。",
-    "再開すると、部品の手前では測り直し、部品の位置では上へ戻ります。"
-  ],
-  "Resume or take away": ["Fortsetzen oder entfernen", "继续或删除", "再開または削除"],
-  "Retract": ["Zurückziehen", "撤回", "退避"],
+  "Resume measures again if the tool has not set out for the part. Otherwise the tool moves back up.":
+    [
+      "Fortsetzen misst neu, wenn das Werkzeug noch nicht zum Teil aufgebrochen ist. Sonst fährt es zurück nach oben.",
+      "继续：如果工具尚未向零件移动，则重新测量；否则工具退回上方。",
+      "再開：工具がまだ部品へ向かっていなければ、測り直します。そうでなければ工具は上へ戻ります。"
+    ],
+  "Resume or delete": ["Fortsetzen oder löschen", "继续或删除", "再開または削除"],
+  "Retract": ["Zurückziehen", "退回", "退避"],
   "Robot": ["Roboter", "机器人", "ロボット"],
   "Rows": ["Reihen", "行数", "行"],
   "Run batch": ["Reihe laufen lassen", "运行批处理", "一括実行"],
@@ -502,14 +508,15 @@ export const TABLE = {
   "Settings, calibrations, recipes and boards in one file, without jobs. One is made before each change.":
     [
       "Einstellungen, Kalibrierungen, Rezepte und Tafeln, ohne Aufträge. Vor jeder Änderung entsteht eine Datei.",
-      "设置、标定、配方和标定板存于一个文件；任务保持原处。每次更改前自动备份。",
-      "設定・校正・レシピ・ボードを一つのファイルに。ジョブはそのまま。変更の前に毎回作られます。"
+      "设置、标定、配方和标定板存于一个文件，不含任务。每次更改前自动备份。",
+      "設定・校正・レシピ・ボードを一つのファイルに（ジョブは含まない）。変更の前に毎回作られます。"
     ],
-  "Shapes need names for this; a lattice needs a grid, an offset a line or lattice.": [
-    "Formen brauchen dazu Namen; ein Gitter braucht ein Raster, ein Versatz eine Linie oder ein Gitter.",
-    "形状需要名称；点阵需要网格，偏移需要直线或点阵。",
-    "形状に名前が必要です。格子点には格子、オフセットには直線か格子点が必要です。"
-  ],
+  "A construction needs named shapes. A lattice needs a grid. An offset needs a line or a lattice.":
+    [
+      "Konstruktionen brauchen benannte Formen. Ein Gitter braucht ein Raster. Ein Versatz braucht Linie oder Gitter.",
+      "构造需要已命名的形状。点阵需要网格。偏移需要直线或点阵。",
+      "構成には名前の付いた形状が必要です。格子点には格子が必要です。オフセットには直線か格子点が必要です。"
+    ],
   "Somebody stands at the emergency stop.": [
     "Jemand steht am Not-Halt.",
     "有人守在急停旁。",
@@ -517,14 +524,14 @@ export const TABLE = {
   ],
   "Source": ["Quelle", "来源", "要因"],
   "Speed": ["Geschwindigkeit", "速度", "速度"],
-  "Speed against step, of a scan that does not stop for its pictures": [
-    "Geschwindigkeit gegen Schritt, für einen Scan, der für Bilder nicht hält",
-    "速度与步距（拍摄时不停的扫描）",
-    "速度とステップ（撮影で止まらない走査）"
+  "Speed and step of a continuous scan": [
+    "Geschwindigkeit und Schritt eines kontinuierlichen Scans",
+    "连续扫描的速度与步距",
+    "連続走査の速度とステップ"
   ],
   "Speed of motions": ["Tempo der Bewegungen", "运动速度", "動作速度"],
   "Spots": ["Punkte", "光点", "スポット"],
-  "Square pose": ["Senkrechte Lage", "垂直位姿", "直角姿勢"],
+  "Perpendicular pose": ["Pose senkrecht zur Fläche", "垂直位姿", "面に垂直な姿勢"],
   "Standard deviation": ["Standardabweichung", "标准差", "標準偏差"],
   "Start": ["Start", "开始", "開始"],
   "State": ["Zustand", "状态", "状態"],
@@ -536,7 +543,7 @@ export const TABLE = {
   "Stops of the axis": ["Halte der Achse", "轴的停点", "軸の停止点"],
   "Support file": ["Datei für den Support", "支持文件", "サポートファイル"],
   "Support file (no pictures)": [
-    "Hilfedatei (ohne Bilder)",
+    "Datei für den Support (ohne Bilder)",
     "支持文件（不含图像）",
     "サポートファイル（画像なし）"
   ],
@@ -575,10 +582,10 @@ export const TABLE = {
     "図面が 1 MB を超えています：コマンドラインの sheetlight model を使ってください。"
   ],
   "The fastest way:": ["Der schnellste Weg:", "最快方式：", "最速："],
-  "The first small moves tell nothing yet.": [
-    "Die ersten kleinen Bewegungen sagen noch nichts.",
-    "最初的小动作尚无结果。",
-    "最初の小さな動きではまだ分かりません。"
+  "The first small moves give no estimate yet.": [
+    "Die ersten kleinen Bewegungen ergeben noch keine Schätzung.",
+    "最初的小动作尚不能给出估计。",
+    "最初の小さな動きではまだ推定できません。"
   ],
   "The job works; no motion waits.": [
     "Der Auftrag arbeitet; keine Bewegung wartet.",
@@ -587,11 +594,11 @@ export const TABLE = {
   ],
   "The part as it was found": ["Das Teil, wie es gefunden wurde", "找到的零件", "見つかった部品"],
   "The part, enlarged": ["Das Teil, vergrößert", "零件，放大", "部品の拡大"],
-  "The pointer's spot on three or more places gives the plane that the tool is to stand square to.":
+  "The pointer's spot on three or more places gives the plane to which the tool becomes perpendicular.":
     [
-      "Der Zeigerpunkt an drei oder mehr Stellen gibt die Ebene, zu der das Werkzeug senkrecht stehen soll.",
-      "三处以上的指针光点给出工具应垂直的平面。",
-      "三か所以上のスポットから、工具を直角に向ける平面が求まります。"
+      "Der Zeigerpunkt an drei oder mehr Stellen gibt die Ebene, zu der das Werkzeug senkrecht wird.",
+      "三处或更多处的指针光点给出工具将与之垂直的平面。",
+      "三か所以上のスポットから、工具が垂直になる平面が求まります。"
     ],
   "The program does not answer.": [
     "Das Programm antwortet nicht.",
@@ -603,10 +610,10 @@ export const TABLE = {
     "程序已重新启动。",
     "プログラムが再起動されました。"
   ],
-  "The program was started without leave to move the robot.": [
-    "Das Programm wurde ohne Erlaubnis zur Bewegung gestartet.",
-    "程序启动时未允许移动机器人。",
-    "ロボットを動かす許可なしで起動されました。"
+  "The program was started without --allow-motion, so the robot does not move.": [
+    "Das Programm wurde ohne --allow-motion gestartet, daher bewegt sich der Roboter nicht.",
+    "程序启动时未带 --allow-motion，因此机器人不会移动。",
+    "プログラムは --allow-motion なしで起動されたため、ロボットは動きません。"
   ],
   "The same, with the password, over TLS": [
     "Dasselbe, mit Passwort, über TLS",
@@ -618,20 +625,21 @@ export const TABLE = {
     "光点不构成平面。",
     "スポットが平面になりません。"
   ],
-  "The station has no [tool]: tilt and square pose are unknown. Add it on the page Settings.": [
-    "Die Station hat kein [tool]: Neigung und senkrechte Lage sind unbekannt. Auf der Seite Einstellungen ergänzen.",
-    "工作站没有 [tool]：无法得知相对倾斜和垂直位姿。请在“设置”页添加。",
-    "ステーションに [tool] がありません：傾きと直角姿勢は不明です。「設定」で追加してください。"
+  "The station has no [tool]: tilt and perpendicular pose are unknown. Add it on the page Settings.":
+    [
+      "Die Station hat kein [tool]: Neigung und senkrechte Pose sind unbekannt. Auf der Seite Einstellungen ergänzen.",
+      "工作站没有 [tool]：倾斜和垂直位姿未知。请在“设置”页添加。",
+      "ステーションに [tool] がありません：傾きと垂直な姿勢は不明です。「設定」で追加してください。"
+    ],
+  "The tool is perpendicular to the surface within 3 sigma.": [
+    "Das Werkzeug steht innerhalb von 3 Sigma senkrecht zur Fläche.",
+    "工具在 3 sigma 内与表面垂直。",
+    "工具は 3 シグマ以内で面に垂直です。"
   ],
-  "The tool stands square as far as that is known.": [
-    "Das Werkzeug steht senkrecht, soweit das bekannt ist.",
-    "就已知精度而言，工具是垂直的。",
-    "分かる範囲では、工具は直角です。"
-  ],
-  "The tool turns about its own tip by that and no more; nothing moves from here.": [
-    "Das Werkzeug dreht sich darum um seine eigene Spitze und nicht mehr; von hier bewegt sich nichts.",
-    "工具绕自身尖端转动该角度，不多转；此处不会产生运动。",
-    "工具は先端を中心にその角度だけ回ります。ここからは何も動きません。"
+  "This motion only turns the tool about its tip. This page moves nothing.": [
+    "Diese Bewegung dreht das Werkzeug nur um seine Spitze. Diese Seite bewegt nichts.",
+    "此动作只使工具绕其尖端转动。本页面不会产生运动。",
+    "この動作は工具を先端まわりに回すだけです。このページからは何も動きません。"
   ],
   "The two scans have no place in common.": [
     "Die beiden Scans haben keine Stelle gemeinsam.",
@@ -639,16 +647,16 @@ export const TABLE = {
     "二つのスキャンに共通部分がありません。"
   ],
   "The whole report": ["Der ganze Bericht", "完整报告", "全報告"],
-  "The work tolerates": ["Die Arbeit verträgt", "工作公差", "作業の許容差"],
+  "Tolerance of the work": ["Toleranz der Arbeit", "工作公差", "作業の許容差"],
   "There is no recording of a board for this.": [
     "Dafür gibt es keine Aufnahme einer Tafel.",
     "没有适用的标定板录制。",
-    "これに使える校正板の記録がありません。"
+    "これに使えるボードの記録がありません。"
   ],
-  "There is no recording of the line below the recordings' folder.": [
-    "Unter dem Ordner der Aufnahmen liegt keine der Linie.",
-    "录制文件夹下没有线激光录制。",
-    "記録フォルダーにライン記録がありません。"
+  "The folder of recordings contains no recording of the laser line.": [
+    "Der Ordner der Aufnahmen enthält keine Aufnahme der Laserlinie.",
+    "录制文件夹中没有激光线的录制。",
+    "記録フォルダーにレーザー線の記録がありません。"
   ],
   "There is no recording of the pointer on a surface.": [
     "Es gibt keine Aufnahme des Zeigers auf einer Fläche.",
@@ -679,7 +687,7 @@ export const TABLE = {
     "このステーションは未校正です。"
   ],
   "Time of the last scan": ["Zeit des letzten Scans", "上次扫描用时", "前回スキャンの時間"],
-  "Tool": ["Werkzeug", "工具", "ツール"],
+  "Tool": ["Werkzeug", "工具", "工具"],
   "Tool goes to": ["Werkzeug geht nach", "工具移至", "工具の行き先"],
   "Tool goes to the part's own place": [
     "Werkzeug geht an den Ort des Teils selbst",
@@ -710,14 +718,14 @@ export const TABLE = {
   "What": ["Was", "项目", "対象"],
   "The part will drop. Open the gripper?": [
     "Das Teil fällt herunter. Greifer öffnen?",
-    "夹持物会掉落：张开？",
-    "持っている物が落ちます。開きますか？"
+    "零件会掉落。打开夹爪？",
+    "部品が落ちます。グリッパーを開きますか？"
   ],
   "What it is": ["Was es ist", "说明", "内容"],
-  "What limits the speed is not known: state the camera's pictures a second, or scan once.": [
-    "Was die Geschwindigkeit begrenzt, ist nicht bekannt: Bilder je Sekunde der Kamera angeben oder einmal scannen.",
-    "速度限制未知：请填写相机帧率，或先扫描一次。",
-    "速度の制限が不明です：カメラの枚/秒を入れるか、一度走査してください。"
+  "The limit of the speed is unknown. State the camera's pictures per second, or scan once.": [
+    "Die Grenze der Geschwindigkeit ist unbekannt. Bilder je Sekunde der Kamera angeben oder einmal scannen.",
+    "速度限制未知。请填写相机帧率，或先扫描一次。",
+    "速度の制限が不明です。カメラの枚/秒を入れるか、一度走査してください。"
   ],
   "What the boards cover": ["Was die Tafeln abdecken", "标定板覆盖范围", "ボードの覆う範囲"],
   "What was found": ["Was gefunden wurde", "找到的结果", "見つかったもの"],
@@ -779,7 +787,7 @@ export const TABLE = {
   "cells": ["Zellen", "个网格", "セル"],
   "cells are left": ["Zellen bleiben", "个网格保留", "セルが残る"],
   "cells in both": ["Zellen in beiden", "共同网格", "共通セル"],
-  "cells taken away": ["Zellen weggenommen", "个网格被去除", "セルを除去"],
+  "cells removed": ["Zellen entfernt", "个网格被移除", "セルを除去"],
   "columns without light": ["Spalten ohne Licht", "无光列", "光のない列"],
   "contrast": ["Kontrast", "对比度", "コントラスト"],
   "counts": ["Zählschritte", "计数", "カウント"],
@@ -793,7 +801,7 @@ export const TABLE = {
   "dark share": ["dunkler Anteil", "暗区占比", "暗い割合"],
   "disk left": ["Platte frei", "剩余磁盘", "ディスク残量"],
   "does not lie on the plane of the others and was excluded": [
-    "liegt nicht auf der Ebene der anderen und wurde weggelassen",
+    "liegt nicht auf der Ebene der anderen und wurde ausgeschlossen",
     "不在其他点的平面上，已排除",
     "他の平面上になく除外"
   ],
@@ -809,25 +817,25 @@ export const TABLE = {
   "first profile": ["erstes Profil", "首条轮廓", "最初のプロファイル"],
   "fixed to": ["fest an", "固定于", "固定先："],
   "flange": ["Flansch", "法兰", "フランジ"],
-  "flange to the sides of its box": [
-    "Flansch bis zum Rand seines Raums",
-    "法兰到工作空间边界",
-    "フランジから作業空間の壁まで"
+  "distance of the flange from the workspace limits": [
+    "Abstand des Flansches vom Rand des Arbeitsraums",
+    "法兰到工作空间边界的距离",
+    "フランジから作業空間の境界までの距離"
   ],
   "flange, at the end": ["Flansch, am Ende", "法兰终点", "フランジの終点"],
   "found": ["gefunden", "已找到", "検出"],
   "frames in": ["Bilder herein", "输入帧", "入力フレーム"],
   "from": ["von", "从", "下限"],
   "from shot to shot": ["von Bild zu Bild", "帧间距", "ショット間隔"],
-  "gates kept": ["Schranken eingehalten", "项门限满足", "個の条件を満たす"],
+  "gates passed": ["Bedingungen erfüllt", "项判定条件满足", "個の判定に合格"],
   "go there?": ["Dorthin fahren?", "去那里？", "そこへ行きますか？"],
   "good": ["gut", "良好", "良好"],
   "hand-eye": ["Hand-Auge", "手眼", "ハンドアイ"],
   "height map and pictures": ["Höhenkarte und Bilder", "高度图和图像", "高さマップと画像"],
-  "held button: longest silence, of 1 s": [
-    "gehaltene Taste: längste Stille, von 1 s",
-    "按住按钮：最长无信号，限 1 s",
-    "押下中ボタンの最長無通信（上限 1 s）"
+  "longest gap between messages of the held button, limit 1 s": [
+    "längste Pause zwischen Meldungen der gehaltenen Taste, Grenze 1 s",
+    "按住按钮时消息的最长间隔，限 1 s",
+    "押下中ボタンのメッセージの最長間隔、上限 1 s"
   ],
   "here": ["hier", "本机", "この機械"],
   "holes": ["Löcher", "个孔", "穴"],
@@ -915,13 +923,13 @@ export const TABLE = {
   "nothing dropped": ["nichts verworfen", "无丢弃", "破棄なし"],
   "of": ["von", "/", "/"],
   "of the cells measured": ["der Zellen gemessen", "网格已测", "のセルを測定"],
-  "of the working volume above the board": [
-    "vom Arbeitsraum über der Platine",
+  "working volume above the board": [
+    "Messbereich über der Platine",
     "电路板上方的工作范围",
     "基板より上の作業範囲"
   ],
-  "of the working volume below it": [
-    "vom Arbeitsraum darunter",
+  "working volume below the board": [
+    "Messbereich unter der Platine",
     "电路板下方的工作范围",
     "基板より下の作業範囲"
   ],
@@ -934,15 +942,15 @@ export const TABLE = {
   "output": ["Ausgang", "输出", "出力"],
   "outside the working volume": ["außerhalb des Arbeitsraums", "超出工作范围", "作業範囲外"],
   "own": ["eigenes", "自有", "独自"],
-  "part may lie aside, along the stripe": [
-    "Teil darf daneben liegen, längs der Linie",
+  "allowed offset of the part, along the stripe": [
+    "zulässiger Versatz des Teils, längs der Linie",
     "零件允许偏移，沿激光线",
-    "部品のずれ許容、線に沿って"
+    "部品の許容ずれ、線に沿って"
   ],
-  "part may lie aside, along the sweep": [
-    "Teil darf daneben liegen, längs des Wegs",
+  "allowed offset of the part, along the sweep": [
+    "zulässiger Versatz des Teils, längs der Abtastfahrt",
     "零件允许偏移，沿扫掠方向",
-    "部品のずれ許容、走査方向"
+    "部品の許容ずれ、走査方向"
   ],
   "skipped": ["übergangen", "跳过", "飛ばした"],
   "peaks; wanted": ["Spitzen; gewünscht", "峰值；目标", "ピーク；目標"],
@@ -1030,7 +1038,7 @@ export const TABLE = {
   "where the boards of the laser plane stood": [
     "wo die Tafeln der Laserebene standen",
     "激光平面标定板所在处",
-    "レーザー平面の校正板の位置"
+    "レーザー平面のボードの位置"
   ],
   "wide": ["breit", "过宽", "太い"],
   "widest gap": ["größte Lücke", "最大间隔", "最大の間隔"],

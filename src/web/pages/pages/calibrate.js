@@ -220,7 +220,7 @@ export async function show(place, query) {
     const worst = Math.max(...Object.values(residual).map(([, v]) => v), 0);
     fill(
       pictures,
-      h("p", { class: "small quiet" }, t("Press a picture to leave it out, then calibrate again.")),
+      h("p", { class: "small quiet" }, t("Press a picture to exclude it, then calibrate again.")),
       h(
         "div",
         { class: "thumbs" },

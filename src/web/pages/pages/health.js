@@ -94,7 +94,7 @@ export async function show(place, query) {
         h(
           "h3",
           {},
-          `${t("Counted here, of a camera of")} ${kept[0].rate_hz} ${t("pictures a second")}`,
+          `${t("Measured on this machine with a camera of")} ${kept[0].rate_hz} ${t("pictures a second")}`,
         ),
         h(
           "div",
@@ -124,7 +124,7 @@ export async function show(place, query) {
       h(
         "h3",
         {},
-        `${t("Estimated from shot time for a camera at")} ${rate} ${t("pictures a second")}`,
+        `${t("Estimated from the time per shot, for a camera of")} ${rate} ${t("pictures a second")}`,
       ),
       table(
         [
@@ -146,7 +146,7 @@ export async function show(place, query) {
         "p",
         { class: "small quiet" },
         t(
-          "1280×960 is twice the resolution of 640×480. Other machines as they were recorded with one clean stripe.",
+          "1280×960 is twice the resolution of 640×480. Other machines were measured earlier, with one clean stripe.",
         ),
       ),
     );
@@ -163,7 +163,7 @@ export async function show(place, query) {
         [String(b.viewers), t("browsers look on")],
         store.motion?.silence_ms != null && [
           num(store.motion.silence_ms, 0, "ms"),
-          t("held button: longest silence, of 1 s"),
+          t("longest gap between messages of the held button, limit 1 s"),
         ],
         b.memory_mb && [
           `${num(b.memory_mb[0], 0)} / ${num(b.memory_mb[1], 0, "MB")}`,

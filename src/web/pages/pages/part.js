@@ -176,7 +176,7 @@ export async function show(place, query) {
       "Two pins",
       {
         shape: "line",
-        says: t("One pin, then another: the tool goes where their middle says"),
+        says: t("Point at two pins: their midpoint sets the tool's position"),
         done: between,
       },
     ],

@@ -92,7 +92,7 @@ export async function show(place, query) {
       : h(
           "p",
           { class: "quiet" },
-          t("There is no recording of the line below the recordings' folder."),
+          t("The folder of recordings contains no recording of the laser line."),
         ),
   );
   place.classList.add("fit");

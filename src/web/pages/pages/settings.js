@@ -114,18 +114,18 @@ export async function show(place) {
         panel(
           t("Who may what"),
           table(
-            [t("Who"), t("May")],
+            [t("Who"), t("Permission")],
             [
               [
                 t("This machine, with the address of this start"),
-                t("Look on; operate, one at a time; everybody stops"),
+                t("Everybody may watch and stop. One person at a time may operate."),
               ],
               [
                 t("Other machines"),
                 t(
                   now.secured
                     ? "The same, with the password, over TLS"
-                    : "Nothing: served to this machine alone",
+                    : "No access: the screen serves only this machine",
                 ),
               ],
               [
@@ -133,7 +133,7 @@ export async function show(place) {
                 t(
                   store.motion?.may_move
                     ? "Who armed the robot and holds the button"
-                    : "Nobody: started without leave to move",
+                    : "Nobody: the program was started without --allow-motion",
                 ),
               ],
             ],

@@ -54,7 +54,7 @@ export async function show(place) {
             h(
               "a",
               { href: `#/${j.order.procedure === "scan" ? "scan" : "replay"}?job=${j.id}` },
-              t("Resume or take away"),
+              t("Resume or delete"),
             ),
           ),
         ),
@@ -90,7 +90,7 @@ export async function show(place) {
             [
               [t("Poses are written as"), info.robot ?? "matrix"],
               [t("Camera is mounted"), t(MOUNTS[info.mount] ?? "not stated")],
-              [t("The work tolerates"), num(info.tolerance_mm, 3, "mm")],
+              [t("Tolerance of the work"), num(info.tolerance_mm, 3, "mm")],
               [t("Scans and poses are in the frame"), t(info.work_frame)],
               ...info.frames.map((f) => [
                 `${t(f.name)} ${t("fixed to")} ${t(f.on)}`,

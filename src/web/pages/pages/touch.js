@@ -43,7 +43,7 @@ export async function show(place, query) {
       h(
         "button",
         { class: "main", id: "touch", disabled: !list.length, onclick: run },
-        t("Propose square pose"),
+        t("Compute the perpendicular pose"),
       ),
     ),
     problem,
@@ -88,12 +88,12 @@ export async function show(place, query) {
   function square(q) {
     if (!q)
       return panel(
-        t("Square pose"),
+        t("Perpendicular pose"),
         h(
           "p",
           { class: "note small" },
           t(
-            "The station has no [tool]: tilt and square pose are unknown. Add it on the page Settings.",
+            "The station has no [tool]: tilt and perpendicular pose are unknown. Add it on the page Settings.",
           ),
         ),
       );
@@ -106,7 +106,7 @@ export async function show(place, query) {
       );
     const off = q.tilt_deg > 3 * q.tilt_sigma_deg;
     return panel(
-      t("Square pose"),
+      t("Perpendicular pose"),
       figures([
         withSigma(q.tilt_deg, q.tilt_sigma_deg, "°"),
         t("the tool leans"),
@@ -117,8 +117,8 @@ export async function show(place, query) {
         { class: "small quiet" },
         t(
           off
-            ? "The tool turns about its own tip by that and no more; nothing moves from here."
-            : "The tool stands square as far as that is known.",
+            ? "This motion only turns the tool about its tip. This page moves nothing."
+            : "The tool is perpendicular to the surface within 3 sigma.",
         ),
       ),
       row(`${t("Flange goes to")} · ${q.convention}`, q.flange, "flange"),
@@ -134,7 +134,7 @@ export async function show(place, query) {
         "p",
         { class: "quiet" },
         t(
-          "The pointer's spot on three or more places gives the plane that the tool is to stand square to.",
+          "The pointer's spot on three or more places gives the plane to which the tool becomes perpendicular.",
         ),
       ),
     );

@@ -41,7 +41,7 @@ export function arming(place) {
         h(
           "p",
           { class: "small quiet" },
-          t("The program was started without leave to move the robot."),
+          t("The program was started without --allow-motion, so the robot does not move."),
         ),
       );
     fill(
@@ -216,7 +216,12 @@ export function ask(place) {
         `${a.motions} ${t("motions")} · ${num(a.speed_mm_s, 0, "mm/s")} · ` +
           `${t("flange, at the end")} · ${a.convention} · ${a.hash.slice(0, 12)}`,
       ),
-      h("details", {}, h("summary", {}, `${a.gates.length} ${t("gates kept")}`), a.gates.map(gate)),
+      h(
+        "details",
+        {},
+        h("summary", {}, `${a.gates.length} ${t("gates passed")}`),
+        a.gates.map(gate),
+      ),
     );
     if (down && a.stays_down && !m.moving) press();
   };
@@ -228,7 +233,9 @@ export function ask(place) {
     h(
       "p",
       { class: "small quiet" },
-      t("It moves while the button is held, to what is shown, once. Let go to halt."),
+      t(
+        "The arm makes the shown motion once, while the button is held. Releasing the button halts it.",
+      ),
     ),
     lines,
   );

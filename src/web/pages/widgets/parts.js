@@ -244,7 +244,9 @@ export function follow(place, id, ended) {
             h(
               "span",
               { class: "quiet small" },
-              t("Resumed before the part it measures anew, at the part it goes back up."),
+              t(
+                "Resume measures again if the tool has not set out for the part. Otherwise the tool moves back up.",
+              ),
             ),
         ),
     );

@@ -7,7 +7,7 @@ import { choice, field, table } from "./parts.js";
 
 /** Settings that are numbers: name with dots, words, unit. */
 const NUMBERS = [
-  ["tolerance_mm", "The work tolerates", "mm"],
+  ["tolerance_mm", "Tolerance of the work", "mm"],
   ["working_volume.near_mm", "Working volume from", "mm"],
   ["working_volume.far_mm", "Working volume to", "mm"],
   ["motion.speed_mm_s", "Speed of motions", "mm/s"],

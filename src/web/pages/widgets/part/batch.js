@@ -139,7 +139,7 @@ function spread(r) {
       "p",
       { class: "small quiet" },
       t(
-        "In the scan's frame, against the median; only where the part stood still between the recordings.",
+        "Deviation from the median, in the scan's frame. It is valid only if the part did not move between recordings.",
       ),
     ),
   );

@@ -162,7 +162,9 @@ export function constructions(place, recipe) {
         h(
           "p",
           { class: "small quiet" },
-          t("Shapes need names for this; a lattice needs a grid, an offset a line or lattice."),
+          t(
+            "A construction needs named shapes. A lattice needs a grid. An offset needs a line or a lattice.",
+          ),
         ),
     );
   }

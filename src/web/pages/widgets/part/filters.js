@@ -95,11 +95,7 @@ export async function filters(place, id, head, { changed, saved, problem }) {
             "span",
             {},
             words(f),
-            h(
-              "div",
-              { class: "small quiet" },
-              `${thousands(now.cells[i])} ${t("cells taken away")}`,
-            ),
+            h("div", { class: "small quiet" }, `${thousands(now.cells[i])} ${t("cells removed")}`),
           ),
           h(
             "button",
@@ -153,8 +149,8 @@ export async function filters(place, id, head, { changed, saved, problem }) {
   draw();
   const box = (filter) => (a, b) => add({ filter, corners: [...a, ...b] });
   return {
-    cut: { shape: "box", says: t("Draw a box around what goes"), done: box("cut") },
-    keep: { shape: "box", says: t("Draw a box around what stays"), done: box("keep") },
+    cut: { shape: "box", says: t("Draw a box around the area to remove"), done: box("cut") },
+    keep: { shape: "box", says: t("Draw a box around the area to keep"), done: box("keep") },
     end: () => follows(),
   };
 }

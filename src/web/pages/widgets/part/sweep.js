@@ -37,7 +37,7 @@ export async function sweep(place) {
       h(
         "p",
         { class: "small quiet" },
-        t("A sweep needs camera, laser plane and hand-eye, calibrated."),
+        t("A sweep needs calibrations of camera, laser plane and hand-eye."),
       ),
     );
   let name = sessionStorage.getItem("recipe") ?? recipes[0].name,
@@ -232,15 +232,15 @@ function numbers(p) {
     figures(
       [num(p.depth_mm, 0, "mm"), t("camera above the board")],
       [num(p.step_mm, 3, "mm"), t("from shot to shot")],
-      left(p.along_mm, "part may lie aside, along the sweep"),
-      left(p.across_mm, "part may lie aside, along the stripe"),
+      left(p.along_mm, "allowed offset of the part, along the sweep"),
+      left(p.across_mm, "allowed offset of the part, along the stripe"),
       ...(p.volume_mm
         ? [
-            left(p.volume_mm[0], "of the working volume above the board"),
-            left(p.volume_mm[1], "of the working volume below it"),
+            left(p.volume_mm[0], "working volume above the board"),
+            left(p.volume_mm[1], "working volume below the board"),
           ]
         : []),
-      p.box_mm !== null && left(p.box_mm, "flange to the sides of its box"),
+      p.box_mm !== null && left(p.box_mm, "distance of the flange from the workspace limits"),
     ),
     p.flange.length > 0 &&
       h(
@@ -252,7 +252,7 @@ function numbers(p) {
           p.flange.map((f, i) => [t(i ? "last" : "first"), ...f.map((v) => num(v, 3))]),
         ),
       ),
-    h("h3", {}, t("Speed against step, of a scan that does not stop for its pictures")),
+    h("h3", {}, t("Speed and step of a continuous scan")),
     q
       ? [
           figures(
@@ -268,8 +268,8 @@ function numbers(p) {
               "data-limit": q.limited_by ?? "",
             },
             q.limited_by
-              ? `${t("No more than this allows")}: ${t(LIMITS[q.limited_by])}`
-              : t("Nothing that is known limits it."),
+              ? `${t("Limited by")}: ${t(LIMITS[q.limited_by])}`
+              : t("No known limit is reached."),
           ),
           q.left_step_mm > 1.000001 * q.step_mm &&
             h(
@@ -284,7 +284,7 @@ function numbers(p) {
           "p",
           { class: "small quiet" },
           t(
-            "What limits the speed is not known: state the camera's pictures a second, or scan once.",
+            "The limit of the speed is unknown. State the camera's pictures per second, or scan once.",
           ),
         ),
   ];

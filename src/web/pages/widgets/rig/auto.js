@@ -125,7 +125,7 @@ export function byTheRobot(place, done) {
 /** A curve of the expected error after each stop, on a logarithmic scale, with the target. */
 function falling(points, target) {
   if (!points.length)
-    return h("p", { class: "quiet small" }, t("The first small moves tell nothing yet."));
+    return h("p", { class: "quiet small" }, t("The first small moves give no estimate yet."));
   const W = 900,
     H = 190,
     values = points.map(([, v]) => v),

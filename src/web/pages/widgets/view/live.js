@@ -52,7 +52,7 @@ export function livePicture(place, of = () => null, mark = (_g, _width, _height)
       ? t(
           part.moved_px > MOVES
             ? "The arm moves: the part is drawn where it was a moment ago."
-            : "Outlines: where the part was found, as this camera should see it. Beside the part: do not go.",
+            : "The outlines show where this camera should see the part. If they lie beside it, do not move the arm.",
         )
       : (refused ?? "");
   };
