@@ -18,11 +18,13 @@ const MOST_CLIENTS: usize = 20;
 struct Client {
     connection: Connection,
     last: Option<(u16, Frame)>,
+    /// Number of its newest datagram, counted over all clients.
+    heard: u64,
 }
 
 pub(super) fn serve(socket: &UdpSocket, controller: &Controller, faults: &Faults, over: &AtomicBool) {
     let mut clients = BTreeMap::<SocketAddr, Client>::new();
-    let mut buffer = [0; 2048];
+    let (mut buffer, mut heard) = ([0; 2048], 0);
     if socket.set_read_timeout(Some(Duration::from_millis(20))).is_err() {
         return;
     }
@@ -34,9 +36,13 @@ pub(super) fn serve(socket: &UdpSocket, controller: &Controller, faults: &Faults
             continue;
         }
         if !clients.contains_key(&from) && clients.len() >= MOST_CLIENTS {
-            clients.pop_first();
+            let silent = clients.iter().min_by_key(|(_, client)| client.heard).map(|(address, _)| *address);
+            silent.and_then(|address| clients.remove(&address));
         }
-        let client = clients.entry(from).or_insert_with(|| Client { connection: controller.connect(), last: None });
+        let new = || Client { connection: controller.connect(), last: None, heard: 0 };
+        let client = clients.entry(from).or_insert_with(new);
+        heard += 1;
+        client.heard = heard;
         let reply = match &client.last {
             Some((first, reply)) if *first == frame.first_serial && frame.first_serial != 0 => {
                 Frame { serial: frame.serial, ..reply.clone() }
