@@ -1,11 +1,11 @@
 // The only table of texts: English, then German, Chinese, Japanese.
 
 export const TABLE = {
-  "1280×960 is twice the resolution of 640×480. Other machines were measured earlier, with one clean stripe.":
+  "1280×960 has four times the pixels of 640×480. Other machines were measured earlier, with one clean stripe.":
     [
-      "1280×960 ist die doppelte Auflösung von 640×480. Andere Maschinen: früher mit einem sauberen Streifen gemessen.",
-      "1280×960 是 640×480 的两倍分辨率。其他机器为先前以单条干净激光线测得。",
-      "1280×960 は 640×480 の倍の解像度です。他の機械は以前、きれいな一本線で測定しました。"
+      "1280×960 hat viermal so viele Pixel wie 640×480. Andere Maschinen: früher mit einem sauberen Streifen gemessen.",
+      "1280×960 的像素数是 640×480 的四倍。其他机器为先前以单条干净激光线测得。",
+      "1280×960 の画素数は 640×480 の4倍です。他の機械は以前、きれいな一本線で測定しました。"
     ],
   "68 % within": ["68 % innerhalb", "68 % 在此范围内", "68 % がこの範囲内"],
   "A camera of": ["Eine Kamera mit", "相机", "カメラ"],

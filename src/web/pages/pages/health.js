@@ -146,7 +146,7 @@ export async function show(place, query) {
         "p",
         { class: "small quiet" },
         t(
-          "1280×960 is twice the resolution of 640×480. Other machines were measured earlier, with one clean stripe.",
+          "1280×960 has four times the pixels of 640×480. Other machines were measured earlier, with one clean stripe.",
         ),
       ),
     );
