@@ -148,7 +148,7 @@ pub fn solve(shots: &[Shot], start: &State, noise: Noise, o: &JointOptions) -> R
         let layout = Layout { camera: o.camera_free.clone(), places: state.far_from_board.len(), shots: shots.len() };
         let round = settle(&shots, &state, noise, &layout, o)?;
         (state, noise) = (round.state.clone(), round.noise);
-        if left_out.len() as f64 <= CONTRADICTING * whole as f64
+        if (left_out.len() + 1) as f64 <= CONTRADICTING * whole as f64
             && let Some((i, group, ratio)) = worst(&round.leavings, shots.len()).filter(|w| w.2 > o.gate)
         {
             let why = format!("{:.1} times as far off as the others", ratio.sqrt());
