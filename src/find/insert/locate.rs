@@ -120,8 +120,8 @@ fn located(
         return Err(Fault::refused(format!("'{}' was not found: nothing scores {least:.2} or more", recipe.name))
             .cause("the part is missing, different, hidden, outside the scan, or the scan has a wrong scale")
             .next(
-                "look at the height map and measure a known length in it: if it is wrong, check the stated sizes of the \
-                 calibration boards; otherwise scan or teach the part again",
+                "look at the height map and measure a known length in it: if it is wrong, check the stated sizes of \
+                 the calibration boards; otherwise scan or teach the part again",
             ));
     }
     let all = if options.all { places(&matches, map) } else { vec![] };
