@@ -146,7 +146,15 @@ fn a_long_scan_needs_no_more_memory_than_a_short_one() {
             (after - middle) as f64 / 1e6
         );
         // 2,100 more shots are 160 MB of pictures, 600,000 points of 36 bytes and as many peaks of 48.
-        assert!(long <= short + 6_000_000, "{name}: {short} bytes for 700 shots, {long} for 2,800");
+        let limit = 6_000_000;
+        if long > short + limit {
+            // A cache of the driver may grow once more, at any time (10 MB of lavapipe's were seen). What a scan
+            // keeps of its shots grows with every 2,100 of them.
+            let longer = scan(&processor, 4900);
+            println!("{name}: host {:.1} MB after 4,900 shots", longer as f64 / 1e6);
+            let marks = format!("{short} bytes for 700 shots, {long} for 2,800, {longer} for 4,900");
+            assert!(longer <= long + limit, "{name}: {marks}");
+        }
         assert_eq!(after - middle, middle - before, "{name}: bytes of GPU buffers made for a scan");
     }
 }
