@@ -6,8 +6,9 @@ use super::height_witness::height_witness;
 use super::scan::held::HeldScan;
 use super::scan::report::{ScanReport, lit_cloud_of, load_report, shots_of};
 use crate::fault::{Fault, Result};
-use crate::find::insert::picture;
+use crate::find::insert::locate::NOT_FOUND;
 use crate::find::insert::teach::{TeachOptions, teach};
+use crate::find::insert::{OtherScale, other_scale, picture};
 use crate::find::{LocateOptions, LookPlan, Recipe, Report, agree, locate, plan_look};
 use crate::geometry::{AxisKind, Base, Flange, Rigid, Vec3};
 use crate::raster::RgbImage;
@@ -131,6 +132,21 @@ pub fn find_part(
     let report = located(&cloud, &shots, &scanned, recipe, rig.as_ref(), options).map_err(|e| e.at(scan.display()))?;
     let image = picture::draw(&report, &recipe.drawing());
     Ok((report, image))
+}
+
+/// Adds to the fault of a scan without the part at which scale of the scan the part would be there. It searches some
+/// forty times: for people who wait for one answer, not for a job.
+pub fn with_scale(fault: Fault, scans: &[PathBuf], recipe: &Recipe, options: &LocateOptions) -> Fault {
+    let of = |scan: &&PathBuf| fault.what.starts_with(&scan.display().to_string());
+    let Some(scan) = scans.iter().find(of).filter(|_| fault.what.contains(NOT_FOUND)) else { return fault };
+    let other = || other_scale(&lit_cloud_of(scan)?, &shots_of(scan)?, recipe, options);
+    let Ok(Some(OtherScale { factor, score })) = other() else { return fault };
+    fault
+        .cause(format!(
+            "the scan has a wrong scale: with all distances from the camera times {factor:.2} the part scores \
+             {score:.2}"
+        ))
+        .next("measure the laser plane's calibration boards, correct their stated size, calibrate and scan again")
 }
 
 /// Finds the recipe's part in a scan in memory; `rig` is the one that made the scan. Without it the error budget

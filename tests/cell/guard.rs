@@ -206,7 +206,7 @@ fn what_changes_between_the_showing_and_the_yes_is_seen() {
     assert!(yes(&mut guard, &p).is_err());
     fake.of().refuses = false;
     guard.looked().unwrap();
-    assert!(yes(&mut guard, &p).unwrap_err().contains("was used"));
+    assert!(yes(&mut guard, &p).unwrap_err().contains("was already used"));
     assert!(fake.of().made.is_empty());
 }
 

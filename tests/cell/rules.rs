@@ -155,7 +155,7 @@ fn one_confirmation_moves_once_and_only_what_was_shown() {
     assert!(make(&same, &shown.hash).is_err() && make(&shown, "").is_err());
     assert_eq!(served.cell.moves(), 0);
     make(&shown, &shown.hash).unwrap();
-    assert!(make(&shown, &shown.hash).unwrap_err().contains("was used"));
+    assert!(make(&shown, &shown.hash).unwrap_err().contains("was already used"));
     assert!(make(&other, &other.hash).unwrap_err().contains("the arm moved by 10.00 mm"), "it starts elsewhere now");
     assert_eq!(served.cell.moves(), 1);
 }
