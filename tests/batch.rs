@@ -325,7 +325,7 @@ fn missing_and_changed_recordings_are_named_and_the_others_go_on() {
     assert!(what(1).contains("has the hash") && what(1).contains("its manifest says"), "{}", what(1));
     assert!(what(2).contains("there is no such folder"), "{}", what(2));
     assert!(said[1..].iter().all(|l| l["problem"]["cause"] != "" && l["problem"]["next"] != ""));
-    assert!(text(&out.stderr).contains("2 of 3 recordings failed"), "{}", text(&out.stderr));
+    assert!(text(&out.stderr).contains("2 of 3 recordings have no result to use"), "{}", text(&out.stderr));
     let error = refused(merge(dir.path()), 1);
     assert!(error.contains("2 of 3 recordings have no results; the first is changed"), "{error}");
     let csv = std::fs::read_to_string(dir.path().join("recordings.csv")).unwrap();

@@ -119,9 +119,14 @@ impl Calibration {
         Ok(PyArray2::from_vec2(py, &self.any.covariance().matrix)?)
     }
 
-    /// Standard deviation of one parameter, None where it is not known.
-    fn sigma(&self, parameter: &str) -> Option<f64> {
-        self.any.covariance().sigma(parameter)
+    /// Standard deviation of one of `parameters`, None where nothing is known. Raises SheetlightError for another name.
+    fn sigma(&self, parameter: &str) -> PyResult<Option<f64>> {
+        let known = &self.any.covariance().parameters;
+        if known.is_empty() || known.iter().any(|name| name == parameter) {
+            return Ok(self.any.covariance().sigma(parameter));
+        }
+        let what = format!("the calibration has no parameter '{parameter}': {}", known.join(", "));
+        Err(raised(Fault::usage(what).next("give one of these names, with its unit")))
     }
 
     /// good, usable, badly determined or refused.

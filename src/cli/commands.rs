@@ -23,7 +23,7 @@ struct Cli {
     /// Print the result as JSON on stdout
     #[arg(long, global = true, display_order = 900)]
     json: bool,
-    /// No progress bars and no messages
+    /// No progress bars and no messages; results are still printed
     #[arg(long, global = true, display_order = 901)]
     quiet: bool,
     /// Print help that fits a screen

@@ -18,6 +18,7 @@ pub enum Command {
   sheetlight rig plan 640x480 --pixel-um 8.3 --focal-mm 5.08 --distance-mm 155 --angle-deg 28
   sheetlight rig plan 1920x1200 --pixel-um 4.8 --view-mm 150 --distance-mm 300 --scatter-mm 0.01
 Guide: docs/hardware.md")]
+#[command(group(clap::ArgGroup::new("lens").required(true)), group(clap::ArgGroup::new("sheet").required(true)))]
 pub struct Args {
     /// Picture size: pixels along the stripe x pixels across it
     #[arg(value_parser = parse::<Pixels>)]
@@ -26,19 +27,19 @@ pub struct Args {
     #[arg(long, value_name = "UM")]
     pixel_um: f64,
     /// Focal length of the lens, mm
-    #[arg(long, value_name = "MM", required_unless_present = "view_mm", conflicts_with = "view_mm")]
+    #[arg(long, value_name = "MM", group = "lens")]
     focal_mm: Option<f64>,
-    /// Instead of the focal length: width that the picture must see along the stripe, mm
-    #[arg(long, value_name = "MM")]
+    /// Instead of the focal length: width that the picture must see along the stripe at this distance, mm
+    #[arg(long, value_name = "MM", group = "lens")]
     view_mm: Option<f64>,
     /// Distance from the lens to the parts, mm
     #[arg(long, value_name = "MM")]
     distance_mm: f64,
     /// Angle between the camera's axis and the laser sheet, degrees
-    #[arg(long, value_name = "DEG", required_unless_present = "scatter_mm", conflicts_with = "scatter_mm")]
+    #[arg(long, value_name = "DEG", group = "sheet")]
     angle_deg: Option<f64>,
-    /// Instead of the angle: how far a point may scatter on a clean stripe, mm (1 sigma)
-    #[arg(long, value_name = "MM")]
+    /// Instead of the angle: the largest scatter of a point allowed, mm (1 sigma, clean stripe)
+    #[arg(long, value_name = "MM", group = "sheet")]
     scatter_mm: Option<f64>,
     /// f-number of the lens
     #[arg(long, value_name = "N", default_value_t = 8.0)]
@@ -75,7 +76,7 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
     let focal = a.view_mm.map(|_| format!("focal length        {:.2} mm\n", plan.focal_mm));
     let angle = a.scatter_mm.map(|_| format!("angle               {:.1} degrees\n", plan.angle_deg));
     let chosen = [focal, angle].into_iter().flatten().collect::<String>();
-    console.result(&Planned { plan, forecast: &forecast }, &(chosen + &text(&forecast)));
+    console.result(&Planned { plan, forecast: &forecast }, &(chosen + &text(&plan, &forecast)));
     Ok(())
 }
 
@@ -88,7 +89,7 @@ struct Planned<'a> {
     forecast: &'a RigForecast,
 }
 
-fn text(f: &RigForecast) -> String {
+fn text(plan: &RigPlan, f: &RigForecast) -> String {
     let range = |(near, far): (f64, Option<f64>)| match far {
         Some(far) => format!("{near:.1} to {far:.1} mm"),
         None => format!("from {near:.1} mm on"),
@@ -99,7 +100,9 @@ fn text(f: &RigForecast) -> String {
         format!("depth per pixel     {:.4} mm", f.depth_per_pixel_mm),
         format!("scatter of a point  {:.4} to {:.4} mm (1 sigma, clean stripe)", f.scatter_mm[0], f.scatter_mm[1]),
         format!("stripe in view      {}", range(f.stripe_mm)),
-        format!("sharp to a pixel    {}", range(f.sharp_mm)),
+        format!("sharp to a pixel    {} at f/{}", range(f.sharp_mm), plan.f_number),
+        format!("works at            {}", range(f.works_mm())),
+        format!("laser               {:.1} mm beside the lens, level with it", plan.distance_mm * f.shadow_mm),
         format!("shadow              {:.2} mm behind a step of 1 mm", f.shadow_mm),
     ]
     .join("\n")

@@ -54,7 +54,7 @@ pub struct Args {
     /// Bits per pixel, 8 to 16 [default: the rig's, 8]
     #[arg(long)]
     bits: Option<u8>,
-    /// Shots of a scan [default: 200; with --rig one per 1.5 pixel footprints; turntable 2000]
+    /// Shots of a scan; fewer are farther apart [default: 200; with --rig one per 1.5 pixel footprints; turntable 2000]
     #[arg(long)]
     shots: Option<usize>,
     /// Flange poses for the set scan or surface, one per shot, as second-look writes them

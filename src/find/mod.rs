@@ -13,7 +13,7 @@ pub mod search;
 pub use insert::CutOff;
 pub use insert::locate::{LocateOptions, Report, agree, beyond_rim, locate};
 pub use insert::recipe::Recipe;
-pub use insert::{TaskOptions, recipe_of};
+pub use insert::{OtherScale, TaskOptions, other_scale, recipe_of};
 pub use look::{LookPlan, Shown, plan_look};
 pub use model::drawing::Drawing;
 pub use model::shape_model::{ModelOptions, ShapeModel};

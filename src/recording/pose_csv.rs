@@ -19,6 +19,7 @@ pub(super) struct Read {
 /// `frame,m00,...,m33` is a matrix in mm; every other layout is preceded by a line `# convention: NAME`.
 pub(super) fn read(text: &str) -> Result<Read> {
     let convention = convention(text)?;
+    let in_mm = stated_unit(text)?;
     let (mut header, mut rows) = (None, Vec::new());
     for r in table(text, ',') {
         let here = |e: Fault| e.at(format!("line {}", r.line));
@@ -28,7 +29,7 @@ pub(super) fn read(text: &str) -> Result<Read> {
         }
     }
     let stated = |k: fn(&Header) -> bool| header.as_ref().is_some_and(k);
-    Ok(Read { length_stated: stated(|h| h.length_stated), angle_stated: stated(|h| h.angle_stated), rows })
+    Ok(Read { length_stated: in_mm || stated(|h| h.length_stated), angle_stated: stated(|h| h.angle_stated), rows })
 }
 
 /// The convention that the last comment before the header names.
@@ -38,6 +39,25 @@ fn convention(text: &str) -> Result<Option<Convention>> {
     let names = comments.filter_map(|l| l.trim_start_matches('#').trim().strip_prefix("convention:"));
     let named = names.last().map(|name| name.trim().parse::<Convention>()).transpose();
     named.map_err(|e| Fault::input(e).next("name a convention of docs/conventions.md"))
+}
+
+/// A comment above the header that states a unit is honoured or refused: mm is what matrices and most robots have, and
+/// the header's columns state all others.
+fn stated_unit(text: &str) -> Result<bool> {
+    let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim);
+    let comments = lines.take_while(|l| l.is_empty() || l.starts_with('#'));
+    let stated = comments.filter_map(|l| {
+        let (key, value) = l.trim_start_matches('#').split_once([':', '='])?;
+        matches!(key.trim().to_lowercase().as_str(), "unit" | "units").then(|| value.trim().to_lowercase())
+    });
+    for value in stated.clone() {
+        if unit(&value) != Some("mm") {
+            return Err(Fault::input(format!("a comment states the unit '{value}', only 'mm' is read there"))
+                .cause("positions in another unit, or units of lengths and angles in one line")
+                .next("convert the positions to mm, or state units in the columns' names: X_mm,...,RX_deg"));
+        }
+    }
+    Ok(stated.count() > 0)
 }
 
 struct Header {

@@ -255,6 +255,17 @@ mod tests {
     }
 
     #[test]
+    fn a_unit_in_a_comment_is_honoured_or_refused() {
+        let head = format!("frame,{}\n0,1,0,0,5,0,1,0,6,0,0,1,7,0,0,0,1\n", Convention::Matrix.labels().join(","));
+        assert_eq!(from_csv(&format!("# units: mm\n{head}")).unwrap().poses.len(), 1);
+        assert_eq!(from_csv(&format!("# exported: today\n{head}")).unwrap().poses.len(), 1);
+        for comment in ["# units: m", "# Unit = metres", "# units: mm, deg"] {
+            let said = from_csv(&format!("{comment}\n{head}")).unwrap_err();
+            assert!(said.what.contains("only 'mm' is read there"), "{comment}: {said}");
+        }
+    }
+
+    #[test]
     fn gaps_and_nan_are_named() {
         let row = "1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1";
         let head = format!("frame,{}\n", Convention::Matrix.labels().join(","));

@@ -46,6 +46,14 @@ const CENTRE_PX: [f64; 2] = [0.02, 0.05];
 /// Accepted angles between camera and laser sheet, degrees.
 const ANGLE_DEG: [f64; 2] = [3.0, 80.0];
 
+impl RigForecast {
+    /// Nearest and farthest distance at which the stripe is in the picture and sharp, mm.
+    pub fn works_mm(&self) -> (f64, Option<f64>) {
+        let far = [self.stripe_mm.1, self.sharp_mm.1].into_iter().flatten().reduce(f64::min);
+        (self.stripe_mm.0.max(self.sharp_mm.0), far)
+    }
+}
+
 impl RigPlan {
     /// The focal length, mm, with which `pixels` of this edge see a view of `view_mm` at `distance_mm`.
     pub fn focal_for(view_mm: f64, pixels: u32, pixel_um: f64, distance_mm: f64) -> f64 {
@@ -175,6 +183,8 @@ mod tests {
         let plan = RigPlan { angle_deg: 10.0, ..GUIDE }.with_scatter(0.0238).unwrap();
         assert!((plan.angle_deg - 28.0).abs() < 0.1, "{plan:?}");
         assert!((plan.forecast().unwrap().scatter_mm[1] - 0.0238).abs() < 1e-9);
+        let works = GUIDE.forecast().unwrap().works_mm();
+        assert!((works.0 - 111.9).abs() < 0.1 && (works.1.unwrap() - 252.3).abs() < 0.1, "{works:?}");
         let fine = GUIDE.with_scatter(0.001).unwrap_err();
         assert!(fine.what.contains("85.5 degrees") && fine.cause.contains("0.2532 mm"), "{fine}");
         assert!(GUIDE.with_scatter(f64::NAN).is_err());

@@ -51,7 +51,7 @@ pub use edit::{changed, edited, point_added, point_chosen, point_taken_out};
 pub use filter::{filter_map, filter_scan, left};
 pub use find::{
     Looked, SecondLook, find_part, find_part_held, find_part_in_all, rig_that_scanned, second_look, teach_held,
-    teach_part,
+    teach_part, with_scale,
 };
 pub use ghost::{Lies, ghost};
 pub use guide::{GuideOptions, Guided, Step, guide};

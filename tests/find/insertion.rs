@@ -5,7 +5,7 @@
 use crate::common;
 use crate::common::pose::{Off, truth};
 use sheetlight::find::insert::recipe::InsertionSpec;
-use sheetlight::find::{LocateOptions, Recipe, Report, locate};
+use sheetlight::find::{LocateOptions, Recipe, Report, locate, other_scale};
 use sheetlight::geometry::{Base, Part, Rigid, Vec3};
 use sheetlight::scan::{Along, CloudPoint, Shots};
 use sheetlight::station::{lit_cloud_of, shots_of};
@@ -143,6 +143,19 @@ fn the_four_parts_are_found_and_the_damaged_scans_are_never_wrong() {
             let cloud: Vec<CloudPoint> = s.cloud.iter().map(cover).collect();
             right_or_refused("half covered", &s, &cloud, &s.truth);
         }
+        // A laser plane whose board was stated too small: where nothing is found, the scale is named.
+        let nearer = |p: &CloudPoint| {
+            let place = s.shots.place(p.shot).unwrap();
+            p.moved_to(place.point(&(place.inverse().point(&p.at()) / 1.25)))
+        };
+        let cloud: Vec<CloudPoint> = s.cloud.iter().map(nearer).collect();
+        right_or_refused("distances / 1.25", &s, &cloud, &s.truth);
+        if let Err(e) = locate(&cloud, &s.shots, &s.recipe, None, &LocateOptions::default()) {
+            let found = other_scale(&cloud, &s.shots, &s.recipe, &LocateOptions::default()).unwrap();
+            println!("{}: {}: {found:?}", s.part, e.what);
+            let found = found.unwrap_or_else(|| panic!("{}: no scale shows the part", s.part));
+            assert!((found.factor / 1.25 - 1.0).abs() < 0.04 && found.score > 0.65, "{}: {found:?}", s.part);
+        }
         // The board without the part: what rises from the board there is pressed flat.
         let board = match s.part {
             "dimm" => -9.0,
@@ -160,6 +173,10 @@ fn the_four_parts_are_found_and_the_damaged_scans_are_never_wrong() {
         for other in PARTS.iter().filter(|p| **p != s.part) {
             let wrong =
                 Scanned { part: s.part, cloud: vec![], shots: s.shots.clone(), truth: s.truth, recipe: recipe(other) };
+            if locate(&s.cloud, &s.shots, &wrong.recipe, None, &LocateOptions::default()).is_err() {
+                let scale = other_scale(&s.cloud, &s.shots, &wrong.recipe, &LocateOptions::default()).unwrap();
+                assert!(scale.is_none(), "{other} on {}: {scale:?}", s.part);
+            }
             assert!(
                 !right_or_refused(&format!("recipe {other} on"), &wrong, &s.cloud, &s.truth),
                 "{other} found in {}",

@@ -270,7 +270,7 @@ fn judge(
             format!("the board's shape was estimated with the camera, as was asked: {off}")
         }
     }));
-    j.reasons.extend(agreed.left_out.iter().map(|(name, why)| format!("{name} was excluded: {why}")));
+    j.reasons.extend(excluded(&agreed.left_out));
     if let Some((name, id, r)) = worst.first() {
         j.reasons.push(format!("worst corner: {name}, feature {id}, {r:.2} px ({} stand out)", worst.len()));
     }
@@ -393,6 +393,25 @@ impl Evidence<'_> {
 /// drawn.
 fn board_shape(pictures: &[Observation], solved: &Solved) -> Option<[f64; 2]> {
     Some(solved.shape.as_ref()?.departs(&pictures.first()?.features))
+}
+
+/// The excluded pictures, those with the same reason in one sentence, in the order of their names.
+fn excluded(left_out: &[(String, String)]) -> Vec<String> {
+    let mut by_reason: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (name, why) in left_out {
+        match by_reason.iter_mut().find(|(reason, _)| reason == why) {
+            Some((_, names)) => names.push(name),
+            None => by_reason.push((why, vec![name])),
+        }
+    }
+    by_reason
+        .into_iter()
+        .map(|(why, mut names)| {
+            names.sort_unstable();
+            let verb = if names.len() == 1 { "was" } else { "were" };
+            format!("{} {verb} excluded: {why}", names.join(", "))
+        })
+        .collect()
 }
 
 /// The lens parameters that the evidence holds at 0, in words; `None` if the lens was stated.

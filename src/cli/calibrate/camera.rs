@@ -67,7 +67,16 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let result = calibrate(&recordings, &options, &|done, _| bar.set_position(done as u64))?;
     bar.finish_and_clear();
     let page = page(&result, &format!("Camera calibration of {}", settings.name));
-    finish(&args.station, &result.calibration, &page, &parameters(&result), &args.keep, console)
+    finish(&args.station, &result.calibration, &page, &parameters(&result), &args.keep, console)?;
+    if !result.left_out.is_empty() {
+        let all = result.left_out.len() + result.used.len();
+        console.warn(format!(
+            "{} of {all} pictures were excluded; the reasons stand above. If the scans are read out as those pictures, the \
+             calibration does not fit them",
+            result.left_out.len()
+        ));
+    }
+    Ok(())
 }
 
 /// The parameters with their standard deviations, and the expected error.

@@ -130,9 +130,16 @@ fn scanned(args: &Args, station: &Path, out: &Path, console: &Console) -> Result
     if bad == 0 {
         return Ok(());
     }
-    Err(Fault::refused(format!("{bad} of {} recordings failed: {}", tally.recordings() + unreadable, words(&tally)))
-        .cause("the reason stands beside each of them")
-        .next("look at those lines; recordings without results are scanned by the next run"))
+    Err(Fault::refused(format!(
+        "{bad} of {} recordings have no result to use: {}",
+        tally.recordings() + unreadable,
+        words(&tally)
+    ))
+    .cause("the reason stands beside each of them")
+    .next(
+        "look at those lines; the next run scans missing and changed recordings again, refused ones only with other \
+             settings, station or recipe",
+    ))
 }
 
 /// A GPU where one may be used and something is looked for.
@@ -142,7 +149,7 @@ fn accelerator(args: &Args) -> Option<Accelerator> {
 }
 
 fn words(tally: &crate::station::Tally) -> String {
-    format!("{} gave no cloud or no pose, {} are missing or changed", tally.refused, tally.failed)
+    format!("{} refused (no cloud or no pose), {} missing or changed", tally.refused, tally.failed)
 }
 
 fn manifest(inputs: &[PathBuf], failed: impl FnMut(&Path, Fault)) -> Result<Manifest> {
@@ -204,7 +211,7 @@ fn talk(line: &BatchLine) -> String {
 }
 
 fn repeated(r: &Repeats) -> String {
-    let head = format!("{} poses; 1 sigma of them, what they state, from the first to the last", r.places);
+    let head = format!("{} poses that passed; their 1 sigma, what they state, between the two extremes", r.places);
     std::iter::once(head).chain(r.along.iter().map(spread)).collect::<Vec<_>>().join("\n")
 }
 

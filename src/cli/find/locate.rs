@@ -11,7 +11,7 @@ use crate::find::{Accelerator, LocateOptions, Recipe, Report};
 use crate::geometry::Vec3;
 use crate::recording::Recording;
 use crate::robot::Convention;
-use crate::station::{Looked, Settings, find_part_in_all};
+use crate::station::{Looked, Settings, find_part_in_all, with_scale};
 use std::path::{Path, PathBuf};
 
 /// Find a part in a scan and compute the insertion pose
@@ -70,7 +70,8 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let options = LocateOptions { up, robot, accelerator: Accelerator::open(), expected: None, all: args.all };
     let range = args.range.as_deref().map(Recording::open).transpose()?;
     let looked = Looked { scans: &args.scans, range: range.as_ref() };
-    let (report, picture) = find_part_in_all(&looked, &recipe, args.station.as_deref(), &options)?;
+    let (report, picture) = find_part_in_all(&looked, &recipe, args.station.as_deref(), &options)
+        .map_err(|fault| with_scale(fault, &args.scans, &recipe, &options))?;
     let text = serde_json::to_string_pretty(&report).expect("plain data");
     crate::files::write_beside((&args.out, text.as_bytes()), &[(&image, &picture.to_png())])?;
     console.result(&report, &summary(&report));
@@ -79,7 +80,11 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         return Ok(());
     }
     Err(Fault::refused(format!("no pose: {}", report.reasons.join("; ")))
-        .cause("the part is hidden in part, another one, or too badly seen")
+        .cause(if report.gates.iter().any(|g| !g.passed && g.name == "sizes' ratio") {
+            "another part, a drawing in another unit, or a scan with a wrong scale"
+        } else {
+            "the part is hidden in part, another one, or too badly seen"
+        })
         .next(format!("look at {}", image.display())))
 }
 

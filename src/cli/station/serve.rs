@@ -43,7 +43,7 @@ pub struct Serve {
     /// Simulation speed factor, 0.1 to 1000
     #[arg(long, default_value_t = 1.0, requires = "simulate")]
     speed: f64,
-    /// Shots of the simulated scan
+    /// Shots of the simulated scan; below about 100 the parts are too coarse to be found
     #[arg(long, default_value_t = 200, requires = "simulate")]
     shots: usize,
     /// Recordings to simulate, separated by commas: scan, intrinsics, handeye, ..., all, none

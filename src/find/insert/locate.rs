@@ -28,6 +28,9 @@ use crate::rig::Rig;
 use crate::robot::Convention;
 use crate::scan::{CloudPoint, GridOptions, HeightMap, Shots, grid};
 
+/// Words of the fault of a scan in which no place looks like the part.
+pub const NOT_FOUND: &str = "was not found: nothing scores";
+
 /// What else is known about a scan.
 #[derive(Clone, Debug)]
 pub struct LocateOptions {
@@ -99,7 +102,12 @@ pub fn beyond_rim(
     partly(&points, &map, recipe, options)
 }
 
-fn seen(cloud: &[CloudPoint], shots: &Shots, recipe: &Recipe, options: &LocateOptions) -> Result<(Ordered, HeightMap)> {
+pub(super) fn seen(
+    cloud: &[CloudPoint],
+    shots: &Shots,
+    recipe: &Recipe,
+    options: &LocateOptions,
+) -> Result<(Ordered, HeightMap)> {
     recipe.check()?;
     let points = Ordered::new(cloud, shots)?;
     let up = options.up.or_else(|| towards_camera(&points)).unwrap_or_else(Vec3::z);
@@ -117,7 +125,7 @@ fn located(
     let least = recipe.search.min_score.min(recipe.gates.min_score);
     let matches = search(map, recipe, options, least)?;
     if matches.is_empty() {
-        return Err(Fault::refused(format!("'{}' was not found: nothing scores {least:.2} or more", recipe.name))
+        return Err(Fault::refused(format!("'{}' {NOT_FOUND} {least:.2} or more", recipe.name))
             .cause("the part is missing, different, hidden, outside the scan, or the scan has a wrong scale")
             .next(
                 "look at the height map and measure a known length in it: if it is wrong, check the stated sizes of \
@@ -139,7 +147,7 @@ fn partly(points: &Ordered, map: &HeightMap, recipe: &Recipe, options: &LocateOp
 }
 
 /// Places of a height map that look like the part, best first.
-fn search(map: &HeightMap, recipe: &Recipe, options: &LocateOptions, least: f64) -> Result<Vec<Match>> {
+pub(super) fn search(map: &HeightMap, recipe: &Recipe, options: &LocateOptions, least: f64) -> Result<Vec<Match>> {
     let scene = scene_of(map, &recipe.layers)?;
     let model = model_of(recipe, &scene)?;
     let mut search = recipe.search;

@@ -10,8 +10,10 @@ mod places;
 pub mod recipe;
 mod report;
 mod rim;
+mod scale;
 pub mod teach;
 pub mod verdict;
 
 pub use from_drawing::{TaskOptions, recipe_of};
 pub use rim::CutOff;
+pub use scale::{OtherScale, other_scale};

@@ -67,7 +67,9 @@ fn written(folder: &Folder, part: &Path) -> Result<Merged> {
         lines.add(&text::line(&entry, &results, row.as_ref()))?;
         tables.add(&entry, results, row.as_ref())?;
         if placed.len() <= MOST_PLACES {
-            placed.extend(row.iter().filter_map(|r| r.found.as_ref()).filter_map(FoundAt::placed));
+            // A pose that missed a gate says nothing about how the part repeats.
+            let passed = row.iter().filter_map(|r| r.found.as_ref()).filter(|f| f.passed);
+            placed.extend(passed.filter_map(FoundAt::placed));
         }
         count(&mut merged, &entry, row.map(|r| r.problem.is_some()));
         Ok(())

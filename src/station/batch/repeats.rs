@@ -40,7 +40,7 @@ pub struct Spread {
     pub scatter: f64,
     /// What they state: root mean square of their own.
     pub stated: f64,
-    /// From the first to the last of them.
+    /// Between the two extremes.
     pub apart: f64,
     /// The histogram reaches so far to both sides of the median.
     pub half: f64,

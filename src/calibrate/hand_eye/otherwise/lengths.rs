@@ -29,6 +29,15 @@ pub fn explain(now: &Present<'_>, o: &HandEyeOptions) -> Option<Explanation> {
         (median < 0.5 * before.spread).then(|| now.better(&then, 2.0)).flatten().map(|fits| (scale, fits))
     });
     let (scale, fits) = fitting.min_by(|a, b| a.1.then.total_cmp(&b.1.then))?;
+    let unit = |range: std::ops::Range<f64>| range.contains(&scale);
+    let converts = [(900.0..1100.0, "1000"), (24.5..26.3, "25.4"), (9.5..10.5, "10"), (9e-4..1.1e-3, "0.001")];
+    let next = match converts.into_iter().find(|(range, _)| unit(range.clone())) {
+        Some((_, factor)) => format!(
+            "multiply the positions in the pose file by {factor}, or name a convention that has their unit; the board's \
+             size is not the cause"
+        ),
+        None => format!("measure the board and correct {}, or state the unit of the poses", o.board_length),
+    };
     let cause = match scale {
         s if (900.0..1100.0).contains(&s) => "the poses are in metres, millimetres are expected".to_string(),
         s if (24.5..26.3).contains(&s) => "the poses are in inches, millimetres are expected".to_string(),
@@ -42,7 +51,7 @@ pub fn explain(now: &Present<'_>, o: &HandEyeOptions) -> Option<Explanation> {
     Some(Explanation {
         what: format!("the robot's lengths must be multiplied by {scale:.4} to agree with the board's"),
         cause,
-        next: format!("state the unit of the poses, or measure the board and correct {}", o.board_length),
+        next,
         fits,
         changes: 1,
         refuses: true,

@@ -1,0 +1,56 @@
+//! In: a scan in which a part was not found. Out: the factor of all distances with which it would be found. A
+//! calibration board whose stated size is wrong scales every distance from the camera, and nothing else shows it.
+//! Frame and unit: the scan's frame, mm.
+
+use super::locate::{LocateOptions, search, seen};
+use super::recipe::Recipe;
+use crate::fault::Result;
+use crate::scan::{CloudPoint, Shots};
+
+/// The distances with which a part would be found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OtherScale {
+    /// All distances from the camera times this.
+    pub factor: f64,
+    /// The score that the part then has.
+    pub score: f64,
+}
+
+/// Factors that are tried, from 1 / `FARTHEST` to `FARTHEST`: an inch read as a centimetre is beyond, other boards lie
+/// within.
+const FARTHEST: f64 = 1.6;
+/// Ratio of neighbouring factors; a model of a wrong size by half of it still matches.
+const STEP: f64 = 1.025;
+/// The score has to exceed the recipe's least one by this: so many tries match clutter now and then.
+const LEAD: f64 = 0.15;
+
+/// The scale with which the part has the highest score, if that score leaves no doubt.
+///
+/// # Errors
+/// Those of [`super::locate::locate`] for a cloud or a recipe that cannot be used.
+pub fn other_scale(
+    cloud: &[CloudPoint],
+    shots: &Shots,
+    recipe: &Recipe,
+    options: &LocateOptions,
+) -> Result<Option<OtherScale>> {
+    let least = recipe.search.min_score.max(recipe.gates.min_score) + LEAD;
+    let options = &LocateOptions { all: false, ..options.clone() };
+    let tries = (FARTHEST.ln() / STEP.ln()).floor() as i32;
+    let mut best: Option<OtherScale> = None;
+    for factor in (-tries..=tries).filter(|k| *k != 0).map(|k| STEP.powi(k)) {
+        let scaled: Vec<CloudPoint> = cloud
+            .iter()
+            .filter_map(|p| {
+                let place = shots.place(p.shot)?;
+                Some(p.moved_to(place.point(&(place.inverse().point(&p.at()) * factor))))
+            })
+            .collect();
+        let (_, map) = seen(&scaled, shots, recipe, options)?;
+        let score = search(&map, recipe, options, least)?.first().map_or(0.0, |m| m.score);
+        if score > best.map_or(least, |b| b.score) {
+            best = Some(OtherScale { factor, score });
+        }
+    }
+    Ok(best)
+}
