@@ -5,12 +5,6 @@ of one frame to another.
 Everything that cannot be done raises `SheetlightError`, which says what happened, why, and what to do next.
 """
 
-import os
-import tempfile
-
-# Vulkan's loader complains on stderr where this is unset; any folder silences it.
-os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
-
 from ._convert import log_to_rerun, to_open3d, to_trimesh, to_xarray
 from ._dtypes import PICTURE_POINT, POINT, xyz
 from ._engine import (

@@ -134,8 +134,8 @@ pub fn find_part(
     Ok((report, image))
 }
 
-/// Shots farther apart than this many cells of the recipe leave too few of its edges. Of the three parts of the built-in
-/// scene, simulated with seed 3, all are found up to 1.6 cells, one at 1.6 to 2.0, none at 2.2 to 2.6.
+/// Shots farther apart than this many cells of the recipe leave too few of its edges. Of the three parts of the
+/// built-in scene, simulated with seed 3, all are found up to 1.6 cells, one at 1.6 to 2.0, none at 2.2 to 2.6.
 const COARSE: f64 = 1.6;
 
 /// Names the step between shots as the cause, if it is coarse for the recipe.
