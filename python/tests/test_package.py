@@ -72,4 +72,4 @@ def test_the_readmes_lines_work(monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
     exec(compile(lines[0], "README.md", "exec"), {})
     said = capsys.readouterr().out
-    assert "points from 120 shots" in said
+    assert "points from 200 shots" in said
