@@ -18,12 +18,13 @@ const FOLDERS: [&[&str]; 5] = [
 ];
 
 /// Blocks that cannot run in a test, by document. The numbers may only fall.
-const NOT_RUN: [(&str, usize); 14] = [
+const NOT_RUN: [(&str, usize); 15] = [
     ("README.md", 3),
     ("docs/api.md", 1),
     ("docs/archives.md", 2),
     ("docs/calibration.md", 1),
     ("docs/cell.md", 3),
+    ("docs/connections.md", 1),
     ("docs/finding-and-inserting.md", 3),
     ("docs/getting-started.md", 2),
     ("docs/joint.md", 1),

@@ -1,5 +1,5 @@
-//! In: a station, a camera, recipes, an address. Out: answers to the requests of a robot's own program over TCP,
-//! until Ctrl-C.
+//! In: a station, a camera, recipes, an address. Out: answers to the requests of a robot's own program or of a PLC
+//! over TCP, until Ctrl-C.
 //! Frame and unit: poses in the robot's own notation.
 
 use crate::capture::CameraUri;
@@ -8,7 +8,7 @@ use crate::cli::terminal::interrupt;
 use crate::fault::{Fault, Result};
 use crate::robot::Convention;
 use crate::scan::Where;
-use crate::station::socket::{Patience, Session, SocketOptions, serve};
+use crate::station::socket::{Patience, Session, SocketOptions, serve, serve_modbus};
 use crate::station::{Output, Settings, guarded, try_output};
 use std::net::TcpListener;
 use std::path::PathBuf;
@@ -51,12 +51,19 @@ fn output(args: &TryOutput, console: &Console) -> Result<()> {
     Ok(())
 }
 
-/// Answer a robot's own program over a TCP socket
+#[derive(Clone, Copy, Default, PartialEq, clap::ValueEnum)]
+enum Protocol {
+    #[default]
+    Lines,
+    Modbus,
+}
+
+/// Answer a robot's own program or a PLC over a TCP socket
 ///
 /// For controllers that are not linked. The robot's program moves the arm, switches the line, and sends the flange
 /// pose at each stop. Sheetlight takes the pictures and answers with poses in the robot's notation. One program at a
-/// time. docs/robots/README.md has the lines and programs for UR, KUKA, FANUC, ABB and Denso. Sheetlight moves no
-/// robot here.
+/// time. docs/robots/README.md has the lines and programs for UR, KUKA, FANUC, ABB and Denso; docs/connections.md has
+/// the registers of Modbus. Sheetlight moves no robot here.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight robot serve --station cell3 --camera gige://first --recipes data/recipes \\
@@ -81,7 +88,10 @@ pub struct Serve {
     /// Notation of the poses (docs/conventions.md) [default: the station's]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
     notation: Option<Convention>,
-    /// Disconnect a program after this silence, s, 1 to 86400
+    /// Lines of text, or registers of Modbus TCP
+    #[arg(long, value_enum, default_value_t)]
+    protocol: Protocol,
+    /// Disconnect a program after this silence, or let another PLC write, s, 1 to 86400
     #[arg(long, default_value_t = 600.0)]
     patience: f64,
     /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
@@ -124,6 +134,10 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
     );
     let patience = Patience { idle: Duration::from_secs_f64(args.patience), ..Patience::default() };
     let stop = interrupt::asked_for();
-    serve(&listener, &mut session, patience, &stop, &mut |line| console.say(line))
-        .map_err(|e| Fault::device(format!("{at}: {e}")).next("start it again"))
+    let mut told = |line: &str| console.say(line);
+    match args.protocol {
+        Protocol::Modbus => serve_modbus(listener, &mut session, patience, &stop, &mut told),
+        Protocol::Lines => serve(&listener, &mut session, patience, &stop, &mut told)
+            .map_err(|e| Fault::device(format!("{at}: {e}")).next("start it again")),
+    }
 }

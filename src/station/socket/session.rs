@@ -2,7 +2,7 @@
 //! and its answer.
 //! Frame and unit: base_from_flange as the notation has it, mm here; tool 0 and work frame 0 on the controller.
 
-use super::words::{self, Code, Of, Request, Which, Wrong};
+use super::words::{self, Code, Of, Reply, Request, Which, Wrong};
 use crate::arm::TimedPose;
 use crate::capture::PictureSource;
 use crate::fault::{Fault, Kind, Result};
@@ -61,7 +61,7 @@ pub struct Session {
     scans: usize,
 }
 
-type Said = std::result::Result<String, Wrong>;
+type Said = std::result::Result<Reply, Wrong>;
 
 impl Session {
     /// A session with a station that has all it needs.
@@ -93,26 +93,35 @@ impl Session {
     /// Executes the request of a line and returns the answer line.
     pub fn answer(&mut self, line: &str) -> String {
         let said = words::read(line).and_then(|request| self.done(request));
-        said.map_or_else(|wrong| words::no(&wrong), |yes| words::yes(&yes))
+        said.map_or_else(|wrong| words::no(&wrong), |reply| words::yes(&reply, self.options.notation))
     }
 
-    fn done(&mut self, request: Request) -> Said {
+    /// Notation of all poses.
+    pub fn notation(&self) -> Convention {
+        self.options.notation
+    }
+
+    /// Executes a request.
+    ///
+    /// # Errors
+    /// The reason in words, with its code.
+    pub fn done(&mut self, request: Request) -> Said {
         match request {
-            Request::Hello => Ok(format!("sheetlight 1 {}", self.options.notation.name())),
+            Request::Hello => Ok(Reply::Hello),
             Request::Status => Ok(self.status()),
             Request::Scan => self.begin(),
             Request::Pose(numbers) => self.shot(&numbers),
             Request::Find(name) => self.find(&name),
             Request::Give(which, of) => self.give(which, of),
-            Request::Bye => Ok("bye".into()),
+            Request::Bye => Ok(Reply::Bye),
         }
     }
 
-    fn status(&self) -> String {
+    fn status(&self) -> Reply {
         match (&self.scan, &self.found) {
-            (Some(scan), _) => format!("scanning {}", scan.shots),
-            (None, Some(found)) => format!("found {}", found.recipe),
-            (None, None) => "idle".into(),
+            (Some(scan), _) => Reply::Scanning(scan.shots),
+            (None, Some(found)) => Reply::Found(found.recipe.clone()),
+            (None, None) => Reply::Idle,
         }
     }
 
@@ -125,7 +134,7 @@ impl Session {
         let record = Record::begin(&folder.join("line"), "scan", Beam::Line, self.camera.pictures()).map_err(ours)?;
         let last = Rigid::from_vectors(&Vec3::zeros(), Vec3::zeros());
         self.scan = Some(Scan { record, shots: 0, last });
-        Ok("0".into())
+        Ok(Reply::Shots(0))
     }
 
     fn shot(&mut self, numbers: &[f64]) -> Said {
@@ -144,7 +153,7 @@ impl Session {
         let (angle, mm) = at.difference(&scan.last);
         if scan.shots > 0 && mm < SAME[0] && angle < SAME[1] {
             // The answer was lost, and the program repeats the request.
-            return Ok(scan.shots.to_string());
+            return Ok(Reply::Shots(scan.shots));
         }
         if scan.shots >= MOST_SHOTS {
             return Err(Wrong::new(
@@ -157,7 +166,7 @@ impl Session {
         let timed = TimedPose { base_from_flange: at, figure: None, asked, here: asked, device: None };
         scan.record.shot(&picture, &timed).map_err(ours)?;
         (scan.shots, scan.last) = (scan.shots + 1, at);
-        Ok(scan.shots.to_string())
+        Ok(Reply::Shots(scan.shots))
     }
 
     fn find(&mut self, name: &str) -> Said {
@@ -179,9 +188,9 @@ impl Session {
         let Some(_) = &report.poses else {
             return Err(Wrong::new(Code::Refused, format!("no pose: {}", report.reasons.join("; "))));
         };
-        let said = format!("{:.3}", report.found.score);
+        let score = report.found.score;
         self.found = Some(report);
-        Ok(said)
+        Ok(Reply::Score(score))
     }
 
     fn located(&self, scan: Scan, recipe: &Recipe, folder: &std::path::Path) -> Result<Report> {
@@ -207,9 +216,9 @@ impl Session {
         };
         let notation = self.options.notation;
         match (of, self.settings.tool) {
-            (Of::Tool, _) => Ok(words::pose(notation, &pose.base_from_tool)),
+            (Of::Tool, _) => Ok(Reply::Pose(notation.write(&pose.base_from_tool))),
             (Of::Flange, Some(tool)) => {
-                Ok(words::pose(notation, &(pose.base_from_tool * tool.flange_from_tool.inverse())))
+                Ok(Reply::Pose(notation.write(&(pose.base_from_tool * tool.flange_from_tool.inverse()))))
             }
             (Of::Flange, None) => {
                 Err(Wrong::new(Code::Failed, "station.toml has no [tool]: where the flange stands is not known"))

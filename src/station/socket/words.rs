@@ -1,7 +1,6 @@
 //! In: a line from a robot's program. Out: its request, or the error in it; answers as lines. Pure.
 //! Frame and unit: the numbers of a pose in its notation.
 
-use crate::geometry::{Frame, Rigid};
 use crate::robot::Convention;
 
 /// Most bytes of a request without its line end; controllers' own strings are shorter.
@@ -25,6 +24,27 @@ pub enum Request {
     /// Asks for a pose of the found part.
     Give(Which, Of),
     /// Ends the connection.
+    Bye,
+}
+
+/// What a request came to.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reply {
+    /// The program and its notation.
+    Hello,
+    /// No scan was begun.
+    Idle,
+    /// A scan with this many shots was begun.
+    Scanning(usize),
+    /// The part of this recipe was found.
+    Found(String),
+    /// Number of shots of the scan.
+    Shots(usize),
+    /// Score of the found part, 0 to 1.
+    Score(f64),
+    /// A pose in the session's notation.
+    Pose(Vec<f64>),
+    /// The connection ends.
     Bye,
 }
 
@@ -125,7 +145,10 @@ fn numbers(text: &str) -> Result<Vec<f64>, Wrong> {
 }
 
 /// A recipe's name becomes a file name: letters, digits, - and _ only.
-fn recipe(name: &str) -> Result<String, Wrong> {
+///
+/// # Errors
+/// Another name.
+pub fn recipe(name: &str) -> Result<String, Wrong> {
     let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
     if (1..=40).contains(&name.len()) && name.chars().all(plain) {
         return Ok(name.to_owned());
@@ -163,18 +186,33 @@ fn shown(text: &str) -> String {
 }
 
 /// A positive answer, without its line end.
-pub fn yes(words: &str) -> String {
-    format!("OK {words}").trim_end().to_owned()
+pub fn yes(reply: &Reply, notation: Convention) -> String {
+    let words = match reply {
+        Reply::Hello => format!("sheetlight 1 {}", notation.name()),
+        Reply::Idle => "idle".into(),
+        Reply::Scanning(shots) => format!("scanning {shots}"),
+        Reply::Found(recipe) => format!("found {recipe}"),
+        Reply::Shots(shots) => shots.to_string(),
+        Reply::Score(score) => format!("{score:.3}"),
+        Reply::Pose(numbers) => pose(notation, numbers),
+        Reply::Bye => "bye".into(),
+    };
+    format!("OK {words}")
 }
 
 /// A negative answer: one line of plain characters.
 pub fn no(wrong: &Wrong) -> String {
-    let plain = wrong.words.chars().map(|c| if c.is_ascii_graphic() || c == ' ' { c } else { '?' });
-    format!("ERROR {} {}", wrong.code as u8, plain.take(MOST_WORDS).collect::<String>()).trim_end().to_owned()
+    format!("ERROR {} {}", wrong.code as u8, plain(wrong)).trim_end().to_owned()
+}
+
+/// The words of an error in plain characters, as many as a controller's string holds.
+pub fn plain(wrong: &Wrong) -> String {
+    let plain = |c: char| if c.is_ascii_graphic() || c == ' ' { c } else { '?' };
+    wrong.words.chars().map(plain).take(MOST_WORDS).collect()
 }
 
 /// A pose's numbers: to 0.1 um, 1e-5 degrees, 1e-7 rad, 1e-6 of a quaternion or matrix.
-pub fn pose<To: Frame, From: Frame>(convention: Convention, pose: &Rigid<To, From>) -> String {
+fn pose(notation: Convention, numbers: &[f64]) -> String {
     let digits = |label: &str| match label.split_once(' ').map(|(_, unit)| unit) {
         Some("mm") => 4,
         Some("deg") => 5,
@@ -182,12 +220,12 @@ pub fn pose<To: Frame, From: Frame>(convention: Convention, pose: &Rigid<To, Fro
         // Six digits: a pose of ABB then fits into one of its strings of 80 characters.
         _ => 6,
     };
-    let one = |(label, x): (&&str, f64)| {
+    let one = |(label, x): (&&str, &f64)| {
         let digits = digits(label);
         // -0.0000 would surprise programs that compare texts.
-        format!("{:.digits$}", if x.abs() < 0.5 * 10f64.powi(-digits) { 0.0 } else { x }, digits = digits as usize)
+        format!("{:.digits$}", if x.abs() < 0.5 * 10f64.powi(-digits) { 0.0 } else { *x }, digits = digits as usize)
     };
-    convention.labels().iter().zip(convention.write(pose)).map(one).collect::<Vec<_>>().join(" ")
+    notation.labels().iter().zip(numbers).map(one).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
@@ -218,7 +256,7 @@ mod tests {
         fn whatever_comes_is_read_or_answered_by_one_plain_line(line in "\\PC{0,80}|(pose|find|give|scan) \
             [\\x00-\\x7f]{0,60}") {
             let answer = match read(&line) {
-                Ok(_) => yes("1"),
+                Ok(_) => yes(&Reply::Shots(1), Convention::Ur),
                 Err(wrong) => no(&wrong),
             };
             prop_assert!(answer.len() <= MOST_WORDS + 10 && answer.chars().all(|c| c.is_ascii_graphic() || c == ' '));
