@@ -136,7 +136,7 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
     let stop = interrupt::asked_for();
     let mut told = |line: &str| console.say(line);
     match args.protocol {
-        Protocol::Modbus => serve_modbus(listener, &mut session, patience, &stop, &mut told),
+        Protocol::Modbus => serve_modbus(&listener, &mut session, patience, &stop, &mut told),
         Protocol::Lines => serve(&listener, &mut session, patience, &stop, &mut told)
             .map_err(|e| Fault::device(format!("{at}: {e}")).next("start it again")),
     }

@@ -3,15 +3,13 @@
 //! sheetlight only answers: docs/robots/README.md has the lines, docs/connections.md the registers.
 //! Frame and unit: base frame; each notation's own units.
 
-#[cfg(feature = "modbus")]
+mod frame;
 mod modbus;
-#[cfg(feature = "modbus")]
 mod registers;
 mod serve;
 mod session;
 pub mod words;
 
-#[cfg(feature = "modbus")]
 pub use modbus::serve_modbus;
 pub use serve::{Patience, serve};
 pub use session::{Session, SocketOptions};
