@@ -53,7 +53,7 @@ pub fn answer(Frame(frame): &Frame, registers: &mut Registers, from: IpAddr) -> 
 fn executed(pdu: &[u8], registers: &mut Registers, from: IpAddr) -> Result<(Vec<u8>, Option<Asked>), u8> {
     let refused = |r: Refused| if r == Refused::Address { ADDRESS } else { BUSY };
     let long = |bytes: usize| if pdu.len() == bytes { Ok(()) } else { Err(VALUE) };
-    // The registers that a request writes: their number stands at `at`, they begin at `data`, after their bytes' number.
+    // The registers that a request writes. Their count stands at `at`, their bytes' count before `data`.
     let counted = |at: usize, most: u16, data: usize| {
         let Some(bytes) = pdu.get(data..) else { return Err(VALUE) };
         let (count, stated) = (word(pdu, at), usize::from(pdu[data - 1]));
