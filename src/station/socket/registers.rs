@@ -81,7 +81,7 @@ impl Registers {
     pub fn new(notation: Convention, patience: Duration) -> Result<Registers> {
         let unit = |label: &&str| label.ends_with(" mm") || label.ends_with(" deg");
         let labels = notation.labels();
-        if labels.len() != POSE / 2 || !labels.iter().all(|l| unit(l)) {
+        if labels.len() != POSE / 2 || !labels.iter().all(unit) {
             let what = format!("Modbus has no registers for poses in the notation {}", notation.name());
             return Err(Fault::usage(format!("{what}: {}", labels.join(", ")))
                 .cause("its registers hold six numbers in mm and degrees")
