@@ -21,7 +21,7 @@ pub struct OtherScale {
 const FARTHEST: f64 = 1.6;
 /// Ratio of neighbouring factors; a model of a wrong size by half of it still matches.
 const STEP: f64 = 1.025;
-/// The score has to exceed the recipe's least one by this: so many tries match clutter now and then.
+/// The score has to exceed the recipe's least one by this, because one of forty tries may match clutter.
 const LEAD: f64 = 0.15;
 
 /// The scale with which most of the points lie where the drawing says, if score and agreement leave no doubt. The
