@@ -183,3 +183,10 @@ def test_wrong_registers_are_refused_by_modbus_own_codes(served):
     assert not plc.write(4, plc.numbers([300, 0, 590, 0, 0, 0])).isError()
     error, words, _ = plc.ask(POSE)
     assert error == 2 and words.startswith("the flange would be 0.662 mm from its base")
+    # A PLC that writes one register at a time, and the low word first.
+    swapped = plc.numbers([300_000, 0, 590_000, 1_800_000, 0, 1_800_000])
+    swapped[::2], swapped[1::2] = swapped[1::2], swapped[::2]
+    for k, word in enumerate(swapped):
+        assert not plc.client.write_register(4 + k, word).isError()
+    error, words, _ = plc.ask(POSE)
+    assert error == 2 and words.startswith("an angle of 200068.3035 degrees"), words

@@ -155,8 +155,8 @@ fn too_coarse(fault: Fault, scan: &Path, recipe: &Recipe) -> Fault {
     }
 }
 
-/// Adds to the fault of a scan without the part at which scale of the scan the part would be there. It searches some
-/// forty times: for people who wait for one answer, not for a job.
+/// If the part was not found, adds the scale with which it would be, or that the scan is too coarse. It searches some
+/// forty times, so it is for people who wait for one answer, not for a job.
 pub fn with_scale(fault: Fault, scans: &[PathBuf], recipe: &Recipe, options: &LocateOptions) -> Fault {
     let of = |scan: &&PathBuf| fault.what.starts_with(&scan.display().to_string());
     let Some(scan) = scans.iter().find(of).filter(|_| fault.what.contains(NOT_FOUND)) else { return fault };

@@ -16,16 +16,15 @@ pub struct OtherScale {
     pub score: f64,
 }
 
-/// Factors that are tried, from 1 / `FARTHEST` to `FARTHEST`: an inch read as a centimetre is beyond, other boards lie
-/// within.
+/// The largest factor that is tried; the smallest is 1 / `FARTHEST`. Two sizes of one kind of board differ by less.
 const FARTHEST: f64 = 1.6;
-/// Ratio of neighbouring factors; a model of a wrong size by half of it still matches.
+/// Ratio of neighbouring factors. A model whose size is wrong by half of it still matches.
 const STEP: f64 = 1.025;
 /// The score has to exceed the recipe's least one by this, because one of forty tries may match clutter.
 const LEAD: f64 = 0.15;
 
-/// The scale with which most of the points lie where the drawing says, if score and agreement leave no doubt. The
-/// score alone told a factor of 1.16 for 1.25: a row of pins fits itself.
+/// The scale with which most points lie where the drawing says, if score and agreement keep their limits. The score
+/// alone gave 1.16 for a flash whose distances had been divided by 1.25.
 ///
 /// # Errors
 /// Those of [`super::locate::locate`] for a cloud or a recipe that cannot be used.

@@ -70,6 +70,8 @@ pub struct Registers {
     input: [u16; input::COUNT],
     since: Instant,
     asks: Option<(IpAddr, Instant)>,
+    /// Another PLC has taken over and made no request yet.
+    taken_over: bool,
     patience: Duration,
 }
 
@@ -89,7 +91,15 @@ impl Registers {
         }
         let mut input = [0; input::COUNT];
         input[input::MAP] = MAP;
-        Ok(Registers { notation, holding: [0; holding::COUNT], input, since: Instant::now(), asks: None, patience })
+        Ok(Registers {
+            notation,
+            holding: [0; holding::COUNT],
+            input,
+            since: Instant::now(),
+            asks: None,
+            taken_over: false,
+            patience,
+        })
     }
 
     /// Registers from `address` on that the PLC wrote.
@@ -133,17 +143,17 @@ impl Registers {
         if owner.is_some_and(|who| who != from) || (new && self.input[input::BUSY] == 1) {
             return Err(Refused::Busy);
         }
-        let by_another = self.asks.is_some_and(|(who, _)| who != from);
-        self.asks = Some((from, now));
-        if by_another {
-            // What another PLC wrote is no part of this one's request.
-            self.holding = [0; holding::COUNT];
+        if self.asks.is_some_and(|(who, _)| who != from) {
+            // What the other PLC wrote is no part of this one's request.
+            (self.taken_over, self.holding) = (true, [0; holding::COUNT]);
         }
+        self.asks = Some((from, now));
         self.holding[begin..end].copy_from_slice(values);
         if !new || number == 0 {
             return Ok(None);
         }
         self.input[input::BUSY] = 1;
+        let by_another = std::mem::take(&mut self.taken_over);
         Ok(Some(Asked { number, request: self.request(), by_another }))
     }
 
@@ -196,7 +206,7 @@ impl Registers {
         }
         match said {
             Ok(Reply::Score(score)) => self.input[input::SCORE] = (score * 1000.0).round() as u16,
-            Ok(Reply::Shots(_)) => self.input[input::SCORE] = 0,
+            _ if !matches!(state, Reply::Found(_)) => self.input[input::SCORE] = 0,
             _ => {}
         }
         // Only a GIVE that succeeded leaves a pose: an old one must not be taken for an answer.
@@ -288,6 +298,13 @@ mod tests {
         let asked = r.write(0, &[2], OTHER, now + Duration::from_secs(10)).unwrap().unwrap();
         assert!(asked.by_another);
         assert!(asked.request.is_err(), "the word was the other's: {asked:?}");
+        r.answer(2, &Ok(Reply::Score(0.9)), &Reply::Found("led".into()));
+        // The first takes over again: what it writes before its request loses nothing.
+        assert_eq!(r.write(16, &[0x6c65], PLC, now + Duration::from_secs(20)), Ok(None));
+        assert!(r.write(0, &[3, 3], PLC, now + Duration::from_secs(21)).unwrap().is_some_and(|a| a.by_another));
+        r.answer(3, &Err(Wrong::new(Code::Order, "no scan")), &Reply::Idle);
+        assert_eq!(r.read(7, 1), Ok(vec![0]), "the score was the other's");
+        assert!(r.write(0, &[4, 1], PLC, now + Duration::from_secs(22)).unwrap().is_some_and(|a| !a.by_another));
     }
 
     #[test]
