@@ -146,6 +146,7 @@ mod tests {
             (&[16], VALUE),
             (&[16, 0, 0, 0, 1, 2, 0], VALUE),
             (&[16, 0, 0, 0, 2, 2, 0, 0], VALUE),
+            (&[16, 0, 0, 0, 1, 3, 0, 0], VALUE),
             // Twice this count is 4 in 16 bits.
             (&[16, 0, 0, 0x80, 2, 4, 0, 0, 0, 0], VALUE),
             (&[16, 0, 36, 0, 1, 2, 0, 0], ADDRESS),
@@ -164,6 +165,7 @@ mod tests {
         assert!(next(&mut bytes).unwrap().is_some());
         assert_eq!(bytes, [0, 2], "the next frame's bytes stay");
         assert!(next(&mut b"GET / HTTP/1.1".to_vec()).is_err());
+        assert!(next(&mut vec![0, 1, 0, 1, 0, 6]).is_err(), "another protocol");
         assert!(next(&mut vec![0, 1, 0, 0, 0, 1]).is_err() && next(&mut vec![0, 1, 0, 0, 1, 0]).is_err());
     }
 
