@@ -11,6 +11,7 @@ mod scaling;
 mod scenes;
 mod steady;
 mod table;
+pub mod throughput;
 mod ways;
 
 pub use keep_up::{KeptUp, keep_up};

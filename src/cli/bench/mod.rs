@@ -1,6 +1,8 @@
 //! In: sizes and scenes. Out: a table of this machine's speeds, or a file of it; or the peer's side of a comparison
 //! on stdin and stdout. Frame and unit: ms, shots/s, pixels, GB/s.
 
+mod entries;
+
 use crate::bench::{self, BenchOptions, KeptUp, Scene, WayTime};
 use crate::cli::terminal::console::Console;
 use crate::fault::Result;
@@ -16,6 +18,7 @@ use std::path::{Path, PathBuf};
 /// of the full chain. Below the table stands the time of a shot and of every further megapixel. If all scenes are
 /// measured, the time of every further per cent of lit pixels follows.
 #[derive(clap::Args)]
+#[command(args_conflicts_with_subcommands = true)]
 #[command(after_help = "Examples:
   sheetlight bench
   sheetlight bench --size 4096x3072 --scene one-stripe --seconds 10
@@ -23,6 +26,8 @@ use std::path::{Path, PathBuf};
   sheetlight bench --json --save benches/runs/2026-11-21-desk
 Guide: benches/README.md")]
 pub struct Args {
+    #[command(subcommand)]
+    command: Option<entries::Command>,
     /// Picture size, px; may be repeated [default: 640x480, 1280x960, 4096x3072, 5120x5120]
     #[arg(long, value_parser = size)]
     size: Vec<(u32, u32)>,
@@ -65,6 +70,9 @@ fn scene(text: &str) -> std::result::Result<Scene, String> {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
+    if let Some(command) = &args.command {
+        return entries::run(command, console);
+    }
     if let Some(rate) = args.keep_up {
         return health(rate, args.seconds, console);
     }
