@@ -2,6 +2,7 @@
 //! same order. The work runs on the GPU or on this machine's processor, with the same results.
 //! Frame and unit: peaks in pixels and grey levels, points in the poses' frame, mm.
 
+use super::pieces::long_pieces;
 use super::{Along, Ambient, Extraction, Format, Place, Processor, Why};
 use crate::camera::Intrinsics;
 use crate::fault::Result;
@@ -186,8 +187,10 @@ impl Engine {
         let long = LONG_PIECE * self.along_px();
         let stripe = |image: &Cow<Image>| {
             let pixels = host.run(0, image, &[0.0; 12]).ok()?.pixels;
-            let stripe = peak::measure(image, &pixels, &seen.peak, self.optics.across())?;
-            Some((pixels.len() as f32 >= long, stripe))
+            let across = self.optics.across();
+            let stripe = |pixels: &[u32]| peak::measure(image, pixels, &seen.peak, across);
+            let lines = || brightest(image, long_pieces(&pixels, across.perp(), long));
+            Some((pixels.len() as f32 >= long, of_the_line(&pixels, lines, stripe)?))
         };
         let found: Vec<(bool, Stripe)> = images.par_iter().filter_map(stripe).collect();
         let telling = found.iter().filter(|f| f.0).count();
@@ -321,6 +324,39 @@ impl Engine {
     fn lit<'a>(&self, image: &'a Image) -> Cow<'a, Image> {
         self.ambient.as_ref().map_or(Cow::Borrowed(image), |a| Cow::Owned(ambient::without(image, &a.image)))
     }
+}
+
+/// Widths of all pieces and of the lines that differ by more than this factor are not of the same light.
+const OTHER_WIDTH: f32 = 1.5;
+/// A line's pixels have at least this share of the level that a tenth of them exceeds. Scattered light is weaker.
+const BRIGHT: f32 = 0.5;
+
+/// The stripe that `measure` finds in the skeleton; in its lines alone, if it finds another width there. Spots and
+/// scattered light of a shiny part can have more skeleton pixels than the stripe: their skeletons branch.
+fn of_the_line(
+    pixels: &[u32],
+    lines: impl Fn() -> Vec<u32>,
+    measure: impl Fn(&[u32]) -> Option<Stripe>,
+) -> Option<Stripe> {
+    let all = measure(pixels)?;
+    let lines = lines();
+    // Another width needs other light: at least a quarter of the pixels.
+    if 4 * lines.len() > 3 * pixels.len() {
+        return Some(all);
+    }
+    let ratio = |of_lines: &Stripe| (of_lines.width_px / all.width_px).max(all.width_px / of_lines.width_px);
+    Some(measure(&lines).filter(|of_lines| ratio(of_lines) > OTHER_WIDTH).unwrap_or(all))
+}
+
+/// The bright ones of these pixels.
+fn brightest(image: &Image, mut pixels: Vec<u32>) -> Vec<u32> {
+    let level = |p: &u32| image.get(p & 0xffff, p >> 16);
+    let mut levels: Vec<u16> = pixels.iter().map(level).collect();
+    levels.sort_unstable();
+    if let Some(&bright) = levels.get(levels.len() * 9 / 10) {
+        pixels.retain(|p| f32::from(level(p)) >= BRIGHT * f32::from(bright));
+    }
+    pixels
 }
 
 /// Size in pixels of a block whose corners are examined first.

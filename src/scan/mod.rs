@@ -13,6 +13,7 @@ mod live;
 mod map;
 pub mod overlay;
 mod pcd;
+mod pieces;
 mod processor;
 mod refine;
 mod scanner;

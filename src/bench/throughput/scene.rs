@@ -34,7 +34,7 @@ pub enum SceneKind {
     Slanted,
     /// Two stripes above each other, the lower one with a peak of 0.45.
     TwoStripes,
-    /// One stripe, bright spots, and a weak second line that is a reflection.
+    /// One stripe, bright spots, and a weak second line three times as wide: light that a surface has scattered.
     Reflections,
     /// One stripe in noise so strong that a tenth of all pixels is brighter than its surroundings by 3 %.
     TenthLit,

@@ -1,0 +1,155 @@
+//! In: entries that keep the format of docs/benchmark.md, and such that break it. Out: rows with a result or the reason
+//! for none; comparison, rules and page of the same file. Frame and unit: px, ms a picture.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_sheetlight");
+
+fn bench(folder: &Path, words: &[&str]) -> Output {
+    Command::new(PROGRAM).args(["--quiet", "bench"]).args(words).current_dir(folder).output().unwrap()
+}
+
+fn done(folder: &Path, words: &[&str]) -> String {
+    let out = bench(folder, words);
+    assert!(out.status.success(), "{words:?}: {}", String::from_utf8_lossy(&out.stderr));
+    String::from_utf8(out.stdout).unwrap()
+}
+
+/// The row of an entry in a scenario.
+fn row<'a>(results: &'a serde_json::Value, entry: &str, scenario: &str) -> &'a serde_json::Value {
+    let rows = results["rows"].as_array().unwrap();
+    rows.iter().find(|r| r["entry"] == entry && r["scenario"] == scenario).unwrap()
+}
+
+/// A program for the shell that says hello and then does what `rest` says.
+fn script(folder: &Path, name: &str, rest: &str) -> String {
+    let path = folder.join(name);
+    let hello = r#"{\"name\":\"script\"}"#;
+    std::fs::write(&path, format!("read header\nprintf '%s\\n' \"{hello}\"\n{rest}\n")).unwrap();
+    format!("{name}=sh {}", path.display())
+}
+
+#[test]
+fn entries_take_turns_and_what_breaks_the_format_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let cpu = format!("cpu={PROGRAM} bench entry --on cpu");
+    let open = format!("open={PROGRAM} bench entry --on cpu --quiet 2>/dev/null # {{scene}}");
+    let pipe = format!("pipe={PROGRAM} bench entry --nothing");
+    let bad = [
+        ("dies", script(at, "dies", "exit 3"), "it ended with exit status: 3"),
+        ("mute", "mute=true".to_owned(), "its first line \"\" is not JSON"),
+        ("chatty", "chatty=echo hello".to_owned(), "its first line \"hello"),
+        // Number 7 where 0 is next, without points.
+        ("other", script(at, "other", r"printf '\007\0\0\0\0\0\0\0'; cat > rest"), "it answered picture 7 where 0"),
+        (
+            "many",
+            script(at, "many", r"printf '\0\0\0\0\377\377\377\377'; cat > rest"),
+            "4294967295 points for picture 0",
+        ),
+        ("short", script(at, "short", r"printf '\0\0\0\0\1\0\0\0xyz'; exit 0"), "its output ends within 1 points"),
+        ("speaks", script(at, "speaks", "echo no licence >&2; exit 1"), "stderr: no licence"),
+        ("absent", "absent=/no/such/program".to_owned(), "not found"),
+    ];
+    let mut words = vec!["run", "--scene", "clean", "--rounds", "2", "--seconds", "0.05", "--out", "r.json"];
+    words.extend(["--size", "320x240", "--scenario", "single", "--scenario", "offline"]);
+    words.extend(["--scenario", "camera", "--scenario", "streams", "--rate", "50"]);
+    let all = [&cpu, &open, &pipe].into_iter().chain(bad.iter().map(|b| &b.1));
+    words.extend(all.flat_map(|entry| ["--entry", entry.as_str()]));
+    let table = done(at, &words);
+    let results: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(at.join("r.json")).unwrap()).unwrap();
+    for scenario in ["single", "offline", "camera", "streams"] {
+        for entry in ["cpu", "open"] {
+            let r = row(&results, entry, scenario);
+            assert_eq!(r["failed"], serde_json::Value::Null, "{r}");
+            assert_eq!(r["rounds"].as_array().unwrap().len(), 2);
+            let a = &r["accuracy"];
+            assert!(a["found"].as_f64().unwrap() > 0.98 && a["rms_px"].as_f64().unwrap() < 0.05, "{r}");
+            assert!(a["rms_mm"].as_f64().unwrap() < 0.05 && a["beyond_three_sigma"].as_f64().unwrap() < 0.03, "{r}");
+            let cpu_s: f64 = r["rounds"].as_array().unwrap().iter().map(|r| r["cpu_s"].as_f64().unwrap()).sum();
+            assert!(cpu_s > 0.0 && r["memory_mb"].as_f64().unwrap() > 5.0, "{r}");
+            assert_eq!(r["rounds"][0]["latency_ms"].is_array(), ["single", "camera"].contains(&scenario), "{r}");
+        }
+        // Four processes share the work, so each picture counts four times.
+        let pictures = |entry| row(&results, entry, scenario)["rounds"][0]["pictures"].as_u64().unwrap();
+        assert_eq!(pictures("cpu") % if scenario == "streams" { 4 } else { 1 }, 0);
+        for (entry, _, want) in &bad {
+            let r = row(&results, entry, scenario);
+            let failed = r["failed"].as_str().unwrap_or_else(|| panic!("{r}"));
+            assert!(failed.contains(want) && r["accuracy"].is_null(), "{entry}, {scenario}: {failed}");
+        }
+    }
+    assert!(row(&results, "cpu", "camera")["rate_hz"] == 50.0);
+    let closed = |i: usize| results["entries"][i]["closed"].as_bool().unwrap();
+    assert!(closed(0) && !closed(1) && results["entries"][0]["says"]["name"] == "Sheetlight");
+    assert!(
+        table.contains("does not count: 0.0 % of the lines found") || table.contains("does not count: false"),
+        "{table}"
+    );
+
+    let compared = done(at, &["compare", "r.json", "cpu", "open"]);
+    assert_eq!(compared.lines().filter(|l| l.starts_with("clean")).count(), 4, "{compared}");
+    done(at, &["compare", "r.json", "cpu", "open", "--at-most", "1000"]);
+    let slow = bench(at, &["compare", "r.json", "cpu", "open", "--at-most", "0.01"]);
+    assert!(slow.status.code() == Some(1), "{slow:?}");
+    // No ratio without accuracy: that is not "fast enough".
+    let none = bench(at, &["compare", "r.json", "cpu", "pipe", "--at-most", "1000"]);
+    assert!(none.status.code() == Some(1), "{none:?}");
+    let rules = bench(at, &["verify", "r.json"]);
+    let found = String::from_utf8(rules.stdout).unwrap();
+    assert_eq!(rules.status.code(), Some(1));
+    for want in ["2 rounds, 9 are needed", "no row for dim, speckle, thick"] {
+        assert!(found.contains(want), "{found}");
+    }
+    assert!(!found.contains("were others") && !found.contains("not described"), "{found}");
+    done(at, &["html", "r.json", "--out", "r.html"]);
+    let page = std::fs::read_to_string(at.join("r.html")).unwrap();
+    assert!(page.contains("open (open)") && page.contains("stderr: no licence"), "{page}");
+}
+
+#[test]
+fn a_slow_program_drops_pictures_of_a_camera_and_nothing_else() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    // Ten pictures a second at most, of 200 that come.
+    let lines = [
+        "while n=$(dd bs=4 count=1 iflag=fullblock 2>/dev/null | od -An -tu4); [ -n \"$n\" ]; do",
+        "dd bs=4096 count=1 iflag=fullblock > /dev/null 2>&1; sleep 0.1",
+        "printf \"$(printf '\\\\%03o\\\\%03o\\\\0\\\\0\\\\0\\\\0\\\\0\\\\0' $((n % 256)) $((n / 256 % 256)))\"; done",
+    ];
+    let slow = script(at, "slow", &lines.join("\n"));
+    let mut words = vec!["run", "--scene", "dark", "--size", "64x64", "--scenario", "camera", "--rate", "200"];
+    words.extend(["--rounds", "1", "--seconds", "1", "--out", "r.json", "--entry", &slow]);
+    done(at, &words);
+    let results: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(at.join("r.json")).unwrap()).unwrap();
+    let r = row(&results, "slow", "camera");
+    assert_eq!(r["failed"], serde_json::Value::Null, "{r}");
+    let of = |key: &str| r["rounds"][0][key].as_u64().unwrap();
+    assert_eq!(of("pictures") + of("dropped"), 200, "{r}");
+    assert!(of("pictures") <= 40 && of("dropped") >= 160, "{r}");
+}
+
+#[test]
+fn wrong_options_and_files_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let refused = |words: &[&str], want: &str| {
+        let out = bench(at, words);
+        let said = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(!out.status.success() && said.contains(want), "{words:?}: {said}");
+    };
+    let run = |more: &[&str], want: &str| refused(&[&["run", "--out", "r.json"], more].concat(), want);
+    run(&["--entry", "nothing"], "is not NAME=COMMAND");
+    run(&["--entry", "a=true", "--entry", "a=false"], "two entries are called a");
+    run(&["--entry", "a=true", "--rounds", "0"], "0 rounds");
+    run(&["--entry", "a=true", "--seconds", "nan"], "seconds a round");
+    run(&["--entry", "a=true", "--size", "8x8"], "64 to 8192");
+    run(&["--entry", "a=true", "--bits", "7"], "7");
+    run(&["--entry", "a=true", "--rate", "0"], "pictures a second");
+    std::fs::write(at.join("x.json"), "{}").unwrap();
+    refused(&["verify", "x.json"], "is not a result of the benchmark");
+    refused(&["compare", "none.json", "a", "b"], "none.json");
+}
