@@ -21,10 +21,10 @@ from pathlib import Path
 QUERY = """
 SELECT regexp_extract(recording, '(\\d{4}-\\d{2}-\\d{2})', 1)::DATE AS day,
        x_mm - first(x_mm) OVER (ORDER BY recording) AS drift_mm,
-       sigma_x_mm
+       sqrt((r11 * sigma_x_mm)**2 + (r12 * sigma_y_mm)**2 + (r13 * sigma_z_mm)**2) AS sigma_mm
 FROM read_parquet('{tables}/matches.parquet') AS matches
 JOIN read_parquet('{tables}/recordings.parquet') AS recordings USING (recording)
-WHERE state = 'done'
+WHERE passed
 ORDER BY day
 """
 

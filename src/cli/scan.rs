@@ -254,9 +254,13 @@ struct WithErrors {
 }
 
 fn summary(r: &ScanReport, out: &Path) -> String {
+    let shots = match r.skipped.len() {
+        0 => r.shots.to_string(),
+        bad => format!("{} of {}", r.shots.saturating_sub(bad), r.shots),
+    };
     let mut s = format!(
-        "{} points from {} shots of {}x{} in {:.1} s ({:.1} shots/s, {})\n",
-        r.points, r.shots, r.image.width, r.image.height, r.seconds, r.shots_per_second, r.ran_on
+        "{} points from {shots} shots of {}x{} in {:.1} s ({:.1} shots/s, {})\n",
+        r.points, r.image.width, r.image.height, r.seconds, r.shots_per_second, r.ran_on
     );
     if let Some(sigma) = r.median_sigma_mm {
         s += &format!("each point good to {sigma:.3} mm (median standard deviation)\n");

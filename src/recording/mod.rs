@@ -198,12 +198,16 @@ impl Recording {
             (Some(n), _) => n,
             (None, Some(n)) => self.inside(n).map(|_| n.as_str())?,
             (None, None) => {
-                let known: Vec<&str> = self.meta.pose_files.keys().map(String::as_str).collect();
+                let there = |name: &str| {
+                    let file = |ending: &str| self.folder.join(format!("{name}.{ending}")).exists();
+                    if file("csv") || file("json") { name.to_owned() } else { format!("{name} (missing)") }
+                };
+                let known: Vec<String> = self.meta.pose_files.keys().map(|name| there(name)).collect();
                 return Err(Fault::usage(format!("{}: meta.json names no single pose file", self.folder.display()))
                     .cause(if known.is_empty() {
                         "the recording has no poses".into()
                     } else {
-                        format!("it has several: {}", known.join(", "))
+                        format!("it lists {}", known.join(", "))
                     })
                     .next("name one with --poses NAME"));
             }

@@ -54,7 +54,10 @@ fn stated_unit(text: &str) -> Result<bool> {
         if unit(&value) != Some("mm") {
             return Err(Fault::input(format!("a comment states the unit '{value}', only 'mm' is read there"))
                 .cause("positions in another unit, or units of lengths and angles in one line")
-                .next("convert the positions to mm, or state units in the columns' names: X_mm,...,RX_deg"));
+                .next(
+                    "convert the positions to mm (of matrices the columns m03, m13, m23); other notations may state \
+                     units in the columns' names: X_mm,...,RX_deg",
+                ));
         }
     }
     Ok(stated.count() > 0)

@@ -140,6 +140,11 @@ impl RecordingSource {
         latency: Option<&Latency>,
     ) -> Result<RecordingSource> {
         let meta = &recording.meta;
+        if !meta.frames.iter().any(|f| f.laser.is_some()) {
+            return Err(Fault::input(format!("{}: has no picture with the laser on", recording.folder.display()))
+                .cause("a board recording, not a scan")
+                .next("give a recording whose frames name 'laser' pictures"));
+        }
         let mut stands = if meta.motion().axis().is_some() { counted(recording)? } else { posed(recording, poses)? };
         if let Some(latency) = latency.filter(|_| by_clock(meta)) {
             latency.of(meta.sources.as_ref())?;
@@ -155,11 +160,6 @@ impl RecordingSource {
         for (name, stand, slip) in stands {
             recording.inside(&name)?;
             jobs.push((jobs.len() as u32, name, stand, slip));
-        }
-        if jobs.is_empty() {
-            return Err(Fault::input(format!("{}: has no picture with the laser on", recording.folder.display()))
-                .cause("a board recording, not a scan")
-                .next("give a recording whose frames name 'laser' pictures"));
         }
         let jobs = jobs.split_off(first.min(jobs.len()));
         let format = Format { width: meta.image.width, height: meta.image.height, bits: recording.bits() };

@@ -267,7 +267,11 @@ fn summary(settings: &Settings, rig: &Rig) -> String {
     };
     let linear = axis(AxisKind::Linear, &rig.linear_axis);
     let turntable = axis(AxisKind::Turntable, &rig.turntable);
-    format!("{}\n{camera}{plane}{pointer}{hand_eye}{linear}{turntable}", settings.name)
+    let stale = rig.stale();
+    let stale =
+        stale.iter().map(|(kind, _)| format!("not used: the {} was measured with another camera\n", kind.words()));
+    let stale: String = stale.collect();
+    format!("{}\n{camera}{plane}{pointer}{hand_eye}{linear}{turntable}{stale}", settings.name)
 }
 
 fn line<T>(what: &str, calibration: &Option<Calibration<T>>, value: impl Fn(&T) -> String) -> String {

@@ -100,7 +100,8 @@ impl Bench<'_> {
             Err(fault) if is_a_result(&fault) => {
                 // What was begun is no part of a result.
                 crate::files::remove(&scan.join("scan.part")).map_err(|e| Fault::write(&scan, e))?;
-                row.problem = Some(placeless(&fault, &[(recording, "recording"), (&scan, "scan"), (place, "results")]));
+                let problem = placeless(&fault, &[(recording, "recording"), (&scan, "scan"), (place, "results")]);
+                row.problem = Some(in_a_batch(problem));
                 Ok(row)
             }
             Err(fault) => Err(fault),
@@ -148,6 +149,18 @@ impl Bench<'_> {
         row.found = Some(FoundAt::of(&report));
         Ok(())
     }
+}
+
+/// The problem without what holds only for a scan of its own: a batch keeps no part of a scan and excludes no picture.
+fn in_a_batch(problem: Problem) -> Problem {
+    let Problem { what, cause, next } = problem;
+    let what = what.split("; the first ").next().unwrap_or_default().to_owned();
+    let next = if next.contains("--resume") {
+        "copy the recording again and make the manifest anew, or scan it alone with sheetlight scan --skip-bad".into()
+    } else {
+        next
+    };
+    Problem { what, cause, next }
 }
 
 /// The fault without the places of this machine.

@@ -105,7 +105,7 @@ fn state(id: &str, rig: &Rig, options: &ScanOptions, part: &Path) -> Result<Chec
 /// Adds to the fault that ended a scan what is stored of it and how to resume.
 fn kept(fault: Fault, state: &Checkpoint, saved: bool, total: Option<usize>) -> Fault {
     let of = total.map_or(String::new(), |n| format!(" of {n}"));
-    let done = format!("{}{of} shots with {} points are kept", state.shots, state.points);
+    let done = format!("the first {}{of} shots with {} points are kept", state.shots, state.points);
     let what = if saved && state.shots > 0 { format!("{}; {done}", fault.what) } else { fault.what };
     Fault { what, ..fault }
 }
@@ -215,8 +215,13 @@ impl<'a> Work<'a> {
                     // The last good shot is not taken: its points are not yet judged by their neighbours.
                     let ready = self.scanner.ready()?;
                     self.take(&ready)?;
-                    let again = "repair the shot and run again with --resume, or leave it out with --skip-bad";
-                    return Err(if last { fault } else { fault.at(name).next(again) });
+                    let again = "copy the shot again and run with --resume, or exclude it with --skip-bad";
+                    let named = fault.what.contains(&name);
+                    return Err(match (last, named) {
+                        (true, _) => fault,
+                        (false, true) => fault.next(again),
+                        (false, false) => fault.at(name).next(again),
+                    });
                 }
                 None => ended = true,
             }

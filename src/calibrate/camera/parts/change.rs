@@ -99,8 +99,8 @@ impl Kind {
         match self {
             Kind::Same => "nothing differs",
             Kind::Flip(_) => {
-                "these pictures were turned or mirrored when they were saved, or the camera's ReverseX and ReverseY \
-                 were changed"
+                "a program turned it when it was saved, or the camera's ReverseX and ReverseY were changed: turn it \
+                 back, or take it again"
             }
             Kind::Focus => "the lens was focused or zoomed in between",
             Kind::Region => "these pictures were cropped, or the camera's region was moved in between",

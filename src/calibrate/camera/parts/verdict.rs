@@ -43,7 +43,7 @@ impl Apart {
     pub fn reason(&self) -> String {
         let [is, then] = self.misfit_px;
         format!(
-            "its misfit to the others' camera is {is:.2} px, and {then:.2} px if it is {}; {}",
+            "it fits the other pictures' camera to {is:.2} px, and to {then:.2} px if it is {}; {}",
             self.how, self.cause
         )
     }

@@ -33,8 +33,8 @@ pub fn explain(now: &Present<'_>, o: &HandEyeOptions) -> Option<Explanation> {
     let converts = [(900.0..1100.0, "1000"), (24.5..26.3, "25.4"), (9.5..10.5, "10"), (9e-4..1.1e-3, "0.001")];
     let next = match converts.into_iter().find(|(range, _)| unit(range.clone())) {
         Some((_, factor)) => format!(
-            "multiply the positions in the pose file by {factor}, or name a convention that has their unit; the \
-             board's size is not the cause"
+            "multiply the positions in the pose file by {factor} (of matrices the columns m03, m13, m23); the board's \
+             size is not the cause"
         ),
         None => format!("measure the board and correct {}, or state the unit of the poses", o.board_length),
     };
