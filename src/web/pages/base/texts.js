@@ -48,6 +48,11 @@ export const TABLE = {
     "此速度下的实际间距",
     "この速度での実際の間隔"
   ],
+  "Arm only while a person stands at the emergency stop.": [
+    "Nur scharf schalten, während jemand am Not-Halt steht.",
+    "仅当有人守在急停旁时才使能。",
+    "非常停止のそばに人がいるときだけ有効にしてください。"
+  ],
   "Axis": ["Achse", "轴", "軸"],
   "Back out": ["Zurückziehen", "退出", "後退する"],
   "Back up now": ["Jetzt sichern", "立即备份", "今すぐバックアップ"],
@@ -517,11 +522,6 @@ export const TABLE = {
       "构造需要已命名的形状。点阵需要网格。偏移需要直线或点阵。",
       "構成には名前の付いた形状が必要です。格子点には格子が必要です。オフセットには直線か格子点が必要です。"
     ],
-  "Somebody stands at the emergency stop.": [
-    "Jemand steht am Not-Halt.",
-    "有人守在急停旁。",
-    "誰かが非常停止の前にいます。"
-  ],
   "Source": ["Quelle", "来源", "要因"],
   "Speed": ["Geschwindigkeit", "速度", "速度"],
   "Speed and step of a continuous scan": [
@@ -832,6 +832,7 @@ export const TABLE = {
   "good": ["gut", "良好", "良好"],
   "hand-eye": ["Hand-Auge", "手眼", "ハンドアイ"],
   "height map and pictures": ["Höhenkarte und Bilder", "高度图和图像", "高さマップと画像"],
+  "linked, not armed": ["verbunden, nicht scharf", "已连接，未使能", "接続済み、無効"],
   "longest gap between messages of the held button, limit 1 s": [
     "längste Pause zwischen Meldungen der gehaltenen Taste, Grenze 1 s",
     "按住按钮时消息的最长间隔，限 1 s",
@@ -964,7 +965,6 @@ export const TABLE = {
   "points": ["Punkte", "点", "点"],
   "poor": ["mäßig", "一般", "要注意"],
   "queued": ["wartet", "排队", "待機"],
-  "read-only": ["nur lesend", "只读", "読み取りのみ"],
   "refused": ["abgelehnt", "拒绝", "却下"],
   "repeats": ["Wiederholungen", "重复次数", "繰り返し"],
   "retract": ["zurückziehen", "退回", "後退"],

@@ -72,7 +72,7 @@ export function arming(place) {
           { class: "small quiet" },
           mine
             ? t("Each motion is shown here and waits for the held button.")
-            : t("Somebody stands at the emergency stop."),
+            : t("Arm only while a person stands at the emergency stop."),
         ),
       ),
       said,

@@ -9,7 +9,7 @@ import { attempt } from "./problem.js";
 
 const ROBOT = {
   no_link: ["no link", ""],
-  read_only: ["read-only", ""],
+  read_only: ["linked, not armed", ""],
   armed: ["armed", "good"],
   moving: ["moving", "poor"],
 };
