@@ -9,7 +9,7 @@ VENV := .venv
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 export XDG_RUNTIME_DIR ?= $(shell mktemp -d /tmp/sheetlight-run.XXXXXX)
 
-.PHONY: station browser demo pages book lint test bench bench-peers vulkan python notebooks pictures cameras build clean
+.PHONY: station browser demo pages book lint test bench bench-entries bench-peers vulkan python notebooks pictures cameras build clean
 
 demo: vulkan build
 	$(TARGET)/release/sheetlight demo --out demo
@@ -45,6 +45,16 @@ lint: pages book
 
 bench: vulkan build
 	$(TARGET)/release/sheetlight bench
+
+# Sheetlight, OpenCV, Steger and a compiled centroid on the same pictures, in turns: ten minutes for each size.
+SIZE = 640x480
+bench-entries: vulkan build
+	tools/python-env.sh $(VENV) peers
+	PATH="$(TARGET)/release:$(VENV)/bin:$$PATH" sheetlight bench run --out throughput.json --size $(SIZE) \
+		--entry 'cpu=sheetlight bench entry --on cpu' --entry 'gpu=sheetlight bench entry --on gpu' \
+		--entry 'pipe=sheetlight bench entry --nothing' --entry 'centroid=python benches/entries/centroid.py' \
+		--entry 'opencv-tiles=python benches/entries/opencv.py --tiles' --entry 'opencv=python benches/entries/opencv.py' \
+		--entry 'steger=python benches/entries/steger.py'
 
 bench-peers: vulkan build
 	tools/python-env.sh $(VENV) peers
