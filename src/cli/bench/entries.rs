@@ -38,7 +38,7 @@ pub struct RunArgs {
     #[arg(long)]
     scene: Vec<SceneKind>,
     /// Picture size, px; may be repeated
-    #[arg(long, value_parser = super::size, default_value = "640x480")]
+    #[arg(long, value_parser = size, default_value = "640x480")]
     size: Vec<(u32, u32)>,
     /// Bits of a pixel, 8 to 16; may be repeated
     #[arg(long, default_value = "8", value_parser = clap::value_parser!(u8).range(8..=16))]
@@ -113,6 +113,12 @@ pub struct EntryArgs {
     /// Read the pictures and return no points: what the pipe takes
     #[arg(long)]
     nothing: bool,
+}
+
+/// WIDTHxHEIGHT, px.
+pub(super) fn size(text: &str) -> std::result::Result<(u32, u32), String> {
+    let both = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    both.ok_or_else(|| format!("'{text}' is not WIDTHxHEIGHT"))
 }
 
 pub fn run(command: &Command, console: &Console) -> Result<()> {

@@ -29,7 +29,7 @@ pub struct Args {
     #[command(subcommand)]
     command: Option<entries::Command>,
     /// Picture size, px; may be repeated [default: 640x480, 1280x960, 4096x3072, 5120x5120]
-    #[arg(long, value_parser = size)]
+    #[arg(long, value_parser = entries::size)]
     size: Vec<(u32, u32)>,
     /// one-stripe, thick-stripe, upright-stripe, upright-thick, noise-heavy or reflection-heavy; may be repeated
     /// [default: all]
@@ -53,11 +53,6 @@ pub struct Args {
     /// Serve another program: settings and pictures on stdin, timings and masks on stdout (benches/peers)
     #[arg(long, hide = true)]
     peer_pipe: bool,
-}
-
-fn size(text: &str) -> std::result::Result<(u32, u32), String> {
-    let both = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-    both.ok_or_else(|| format!("'{text}' is not WIDTHxHEIGHT"))
 }
 
 fn scene(text: &str) -> std::result::Result<Scene, String> {
