@@ -7,8 +7,8 @@ use std::collections::HashMap;
 /// Pixels this near belong to one piece, px: thinning leaves gaps of a pixel.
 const NEAR: i32 = 2;
 
-/// The pixels of pieces that reach over `least` px or more in direction `along`, in their order. A pixel is x | y << 16.
-/// The number of a piece's pixels would not do: the skeleton of a spot branches.
+/// The pixels of pieces that reach over `least` px or more in direction `along`, in their order. A pixel is
+/// x | y << 16. The number of a piece's pixels would not do: the skeleton of a spot branches.
 pub(super) fn long_pieces(pixels: &[u32], along: Vec2, least: f32) -> Vec<u32> {
     let index: HashMap<u32, usize> = pixels.iter().enumerate().map(|(i, &p)| (p, i)).collect();
     let mut piece = vec![usize::MAX; pixels.len()];

@@ -9,12 +9,13 @@ use std::path::Path;
 use std::process::Command;
 
 /// Documents whose commands run one after the other in one folder, as a reader would type them.
-const FOLDERS: [&[&str]; 5] = [
+const FOLDERS: [&[&str]; 6] = [
     &["docs/getting-started.md", "docs/calibration.md", "docs/scanning.md", "docs/finding-and-inserting.md"],
     &["docs/hardware.md"],
     &["README.md"],
     &["docs/connections.md"],
     &["docs/archives.md"],
+    &["docs/benchmark.md"],
 ];
 
 /// Blocks that cannot run in a test, by document. The numbers may only fall.
@@ -200,6 +201,11 @@ fn the_page_of_connections_shows_what_its_commands_print() {
 #[test]
 fn the_page_of_archives_shows_what_its_commands_print() {
     agree(FOLDERS[4]);
+}
+
+#[test]
+fn the_page_of_the_benchmark_shows_what_its_commands_print() {
+    agree(FOLDERS[5]);
 }
 
 #[test]

@@ -6,7 +6,8 @@ use super::scene::Task;
 use super::wire::Scenario;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:72rem;padding:0 1rem;color:#1c2733}\
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:72rem;padding:0 1rem;\
+color:#1c2733}\
 table{border-collapse:collapse;margin:.5rem 0 1.5rem;font-variant-numeric:tabular-nums}\
 th,td{padding:.15rem .6rem;text-align:right;border-bottom:1px solid #dde3e8}\
 th:first-child,td:first-child{text-align:left}\
@@ -89,7 +90,8 @@ fn of_run(name: &str, run: &Results) -> Markup {
     html! {
         h2 { (name) }
         p {
-            (m.processor) ", " (m.threads) " threads, " (m.memory_mb.map_or_else(String::new, |mb| format!("{mb} MB, ")))
+            (m.processor) ", " (m.threads) " threads, "
+            @if let Some(mb) = m.memory_mb { (mb) " MB, " }
             (m.system) "; " (run.started) "; driver " (run.driver)
             @if let Some(load) = m.load { "; load before the run " (load) }
         }
@@ -123,9 +125,11 @@ pub fn page(runs: &[(String, Results)]) -> String {
             body {
                 h1 { "Laser stripe benchmark" }
                 p {
-                    "Programs read the same pictures of a laser stripe in turns and return points. Times are medians of the "
-                    "rounds. Distances are measured from the exact line of the same pictures. Grey rows do not count: their "
-                    "points are too few or too wrong. The rules stand in docs/benchmark.md."
+                    "Programs read the same pictures of a laser stripe in turns and return points. "
+                    "Times are medians of the rounds. "
+                    "Distances are measured from the exact line of the same pictures. "
+                    "Grey rows do not count: their points are too few or too wrong. "
+                    "The rules stand in docs/benchmark.md."
                 }
                 @for (name, run) in runs { (of_run(name, run)) }
             }

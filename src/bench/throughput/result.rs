@@ -1,4 +1,5 @@
-//! In: what was measured. Out: the file of a benchmark run, and whether a row counts (docs/benchmark.md, "What counts").
+//! In: what was measured. Out: the file of a benchmark run, and whether a row counts (docs/benchmark.md, "What
+//! counts").
 //! Frame and unit: stated at the fields.
 
 use super::scene::{SceneKind, Task};

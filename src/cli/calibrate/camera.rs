@@ -71,8 +71,8 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     if !result.left_out.is_empty() {
         let all = result.left_out.len() + result.used.len();
         console.warn(format!(
-            "{} of {all} pictures were excluded; the reasons stand above. Compare your scans with the excluded pictures: \
-             if the scans look like these, the calibration is wrong for them",
+            "{} of {all} pictures were excluded; the reasons stand above. Compare your scans with the excluded \
+             pictures: if the scans look like these, the calibration is wrong for them",
             result.left_out.len()
         ));
     }

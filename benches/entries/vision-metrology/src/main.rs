@@ -1,5 +1,5 @@
-//! In: pictures on standard input. Out: points by vision-metrology's stripe extraction on standard output, in the format
-//! of docs/benchmark.md. Frame and unit: px; camera frame, mm.
+//! In: pictures on standard input. Out: points by vision-metrology's stripe extraction on standard output, in the
+//! format of docs/benchmark.md. Frame and unit: px; camera frame, mm.
 
 use serde_json::Value;
 use std::error::Error;
@@ -111,7 +111,8 @@ fn centres<P: Pixel + Clone + Send + Sync>(
 
 fn main() -> Result<(), Box<dyn Error>> {
     let o = options()?;
-    let (mut input, mut output) = (BufReader::with_capacity(1 << 20, std::io::stdin().lock()), std::io::stdout().lock());
+    let mut input = BufReader::with_capacity(1 << 20, std::io::stdin().lock());
+    let mut output = std::io::stdout().lock();
     let mut line = String::new();
     input.read_line(&mut line)?;
     let header: Value = serde_json::from_str(&line)?;
