@@ -50,8 +50,13 @@ fn lines(out: &Output) -> Vec<Value> {
 /// The error of a command that fails so, with what it says at every line.
 fn refused(command: Command, code: i32) -> String {
     let out = output(command);
+    assert_eq!(out.status.code(), Some(code), "{}", text(&out.stderr));
+    refused_by(out)
+}
+
+/// What a command says that has failed.
+fn refused_by(out: Output) -> String {
     let said = text(&out.stderr);
-    assert_eq!(out.status.code(), Some(code), "{said}");
     assert!(said.matches("error: ").count() == 1, "one error: {said}");
     assert!(said.contains("likely cause: ") && said.contains("next step: "), "{said}");
     said
@@ -331,6 +336,37 @@ fn missing_and_changed_recordings_are_named_and_the_others_go_on() {
     let csv = std::fs::read_to_string(dir.path().join("recordings.csv")).unwrap();
     assert_eq!((csv.lines().count(), csv.matches("no results").count()), (4, 2), "{csv}");
     assert_eq!(results(&files(dir.path())).len(), 1, "what failed has no folder");
+}
+
+#[test]
+fn a_picture_that_is_cut_refuses_its_recording_unless_it_is_excluded() {
+    let dir = tempfile::tempdir().unwrap();
+    let cut = dir.path().join("cut");
+    copy(&archive().join("recordings/1"), &cut, 0.0);
+    let picture = cut.join("laser_0030.png");
+    let bytes = std::fs::read(&picture).unwrap();
+    std::fs::write(&picture, &bytes[..bytes.len() / 2]).unwrap();
+    let run = |name: &str, more: &[&str]| {
+        let mut command = program(["batch", "--on", "cpu"]);
+        command.arg(&cut).arg("--recipe").arg(archive().join("part.toml")).args(more);
+        command.arg("--station").arg(archive().join("station")).arg("--out").arg(dir.path().join(name));
+        output(command)
+    };
+    let out = run("whole", &[]);
+    let line = &lines(&out)[0];
+    assert_eq!((out.status.code(), &line["state"]), (Some(1), &"refused".into()), "{line}");
+    let problem = |key: &str| line["problem"][key].as_str().unwrap();
+    assert!(problem("what").starts_with("recording/laser_0030.png: is not a readable picture"), "{line}");
+    assert!(problem("next").contains("--skip-bad") && !problem("what").contains("kept"), "{line}");
+    let out = run("most", &["--skip-bad"]);
+    let line = &lines(&out)[0];
+    assert_eq!((out.status.code(), &line["state"]), (Some(0), &"done".into()), "{line}");
+    let scan = dir.path().join("most").join(line["results"].as_str().unwrap()).join("scan/scan.json");
+    let scan = std::fs::read_to_string(scan).unwrap();
+    assert!(scan.contains("laser_0030.png") && !scan.contains(dir.path().to_str().unwrap()), "{scan}");
+    // Results with excluded pictures are others: a batch of one kind does not take those of the other.
+    let other = refused_by(run("most", &[]));
+    assert!(other.contains("its settings is"), "{other}");
 }
 
 #[test]

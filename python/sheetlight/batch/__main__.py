@@ -27,6 +27,7 @@ def _arguments() -> argparse.ArgumentParser:
     parser.add_argument("--out", required=True, help="folder for results and tables, the same for all workers")
     parser.add_argument("--recipe", help="recipe (TOML) of the part")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="change a setting")
+    parser.add_argument("--skip-bad", action="store_true", help="exclude pictures that cannot be read")
     parser.add_argument("--on", default="auto", help="where the stages run: auto, gpu or cpu")
     parser.add_argument("--robot", help="notation of the poses")
     parser.add_argument("--workers", type=int, metavar="N", help="workers [default: with --ray one a device]")
@@ -51,6 +52,7 @@ def _batch(given: argparse.Namespace) -> Batch:
 
     words = [whole(given.manifest), "--station", whole(given.station), "--out", whole(given.out), "--on", given.on]
     words += ["--recipe", whole(given.recipe)] if given.recipe else []
+    words += ["--skip-bad"] if given.skip_bad else []
     words += ["--robot", given.robot] if given.robot else []
     words += [word for change in given.set for word in ("--set", change)]
     return Batch(program if given.ray is None else given.program, words, whole(given.out))

@@ -6,8 +6,7 @@ use crate::camera::{Distortion, Intrinsics};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Plane, Vec3};
 use crate::raster::Image;
-use crate::scan::{Engine, Extraction, Format, Measured, Optical, Place, StripeSeen, Where};
-use crate::stages::peak::{Stripe, noise};
+use crate::scan::{Engine, Extraction, Format, Measured, Optical, Place, Where};
 use std::io::{BufRead, Read, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
@@ -94,7 +93,7 @@ fn engine(header: &Header, place: Where) -> Result<Engine> {
     Ok(if singly { engine.one_at_a_time() } else { engine })
 }
 
-/// Measures the stripe in the first pictures, as a scan does, then answers every picture.
+/// Measures the stripe in the first pictures that show it, as a scan does, then answers every picture.
 fn learn_then_run(
     engine: &mut Engine,
     scenario: Scenario,
@@ -102,25 +101,22 @@ fn learn_then_run(
     output: &mut impl Write,
 ) -> Result<()> {
     let quiet = if matches!(scenario, Scenario::Single | Scenario::Camera) { Duration::ZERO } else { QUIET };
-    let mut first = Vec::new();
-    while first.len() < AHEAD {
-        // The driver may wait for the answer to its first picture before it sends the second.
-        let next = if first.is_empty() { pictures.recv().ok() } else { pictures.recv_timeout(quiet).ok() };
-        let Some(next) = next else { break };
-        first.push(next?);
-    }
-    if first.is_empty() {
-        return Ok(());
-    }
-    let images: Vec<&Image> = first.iter().map(|(_, image)| image).collect();
-    let assumed = || StripeSeen::assumed(Stripe { noise: noise(images[0]), ..Stripe::default() });
-    let seen = engine.measure(&images).unwrap_or_else(assumed);
-    engine.set_stripe(&seen.stripe)?;
-    engine.set_hot(seen.hot);
     let mut waiting = 0usize;
-    for (number, image) in first {
-        engine.submit(number, image, Place::camera())?;
-        waiting += 1;
+    while waiting == 0 {
+        let first = some(pictures, quiet)?;
+        if first.is_empty() {
+            return Ok(());
+        }
+        let Some(seen) = engine.measure(&first.iter().map(|(_, image)| image).collect::<Vec<_>>()) else {
+            first.iter().try_for_each(|(number, _)| write_points(output, *number, &[]))?;
+            continue;
+        };
+        engine.set_stripe(&seen.stripe)?;
+        engine.set_hot(seen.hot);
+        for (number, image) in first {
+            engine.submit(number, image, Place::camera())?;
+            waiting += 1;
+        }
     }
     loop {
         let next = if waiting == 0 {
@@ -143,6 +139,18 @@ fn learn_then_run(
             write_points(output, measured.shot, &kept(&measured))?;
         }
     }
+}
+
+/// The next pictures, and those that wait behind it: the driver may wait for the answer to its first picture before it
+/// sends the second. None at the end of the input.
+fn some(pictures: &Receiver<Result<(u32, Image)>>, quiet: Duration) -> Result<Vec<(u32, Image)>> {
+    let mut some = Vec::new();
+    while some.len() < AHEAD {
+        let next = if some.is_empty() { pictures.recv().ok() } else { pictures.recv_timeout(quiet).ok() };
+        let Some(next) = next else { break };
+        some.push(next?);
+    }
+    Ok(some)
 }
 
 /// The points that no test rejected.
@@ -196,9 +204,10 @@ mod tests {
                 assert!(a.false_share.unwrap() < wrong, "{} {a:?}", task.name());
             }
         }
-        let dark = Task { scene: SceneKind::Dark, width: 320, height: 240, bits: 8 };
-        let (numbers, a) = answered(&dark, Scenario::Offline);
-        assert!(numbers == [0, 1, 2] && a.false_a_picture < 1.0, "{a:?}");
+        for (width, height, scenario) in [(320, 240, Scenario::Offline), (640, 480, Scenario::Single)] {
+            let (numbers, a) = answered(&Task { scene: SceneKind::Dark, width, height, bits: 8 }, scenario);
+            assert!(numbers == [0, 1, 2] && a.false_a_picture < 1.0, "{a:?}");
+        }
     }
 
     #[test]

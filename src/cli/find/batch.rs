@@ -51,6 +51,9 @@ pub struct Args {
     /// Folder for results and tables
     #[arg(long, required = true)]
     out: Option<PathBuf>,
+    /// Exclude pictures that cannot be read; figures.parquet counts them as skipped_shots
+    #[arg(long)]
+    skip_bad: bool,
     /// Scan the i-th of n shares of the manifest
     #[arg(long, value_name = "i/n", value_parser = parse::<Shard>)]
     shard: Option<Shard>,
@@ -110,6 +113,7 @@ fn scanned(args: &Args, station: &Path, out: &Path, console: &Console) -> Result
         out: out.to_owned(),
         settings: changes(&args.settings)?,
         place: args.on,
+        skip_bad: args.skip_bad,
         locate: LocateOptions { robot, accelerator: accelerator(args), ..LocateOptions::default() },
         stop: interrupt::asked_for(),
     };

@@ -25,6 +25,8 @@ pub struct BatchOptions {
     pub settings: BTreeMap<String, Value>,
     /// Where the stages run.
     pub place: Where,
+    /// Exclude shots that cannot be read. Without it they refuse their recording.
+    pub skip_bad: bool,
     /// How and where parts are looked for, and the notation of poses.
     pub locate: LocateOptions,
     /// Ends it; what was done is kept.
@@ -64,6 +66,10 @@ impl Identity {
             Where::Cpu => "cpu",
         };
         settings.insert("--on".into(), place.into());
+        // Only where it is asked for: results of batches without it keep their names.
+        if options.skip_bad {
+            settings.insert("--skip-bad".into(), true.into());
+        }
         settings.insert("--robot".into(), serde_json::to_value(options.locate.robot).expect("a word"));
         Ok(Identity {
             format: FORMAT,

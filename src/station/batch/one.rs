@@ -113,10 +113,13 @@ impl Bench<'_> {
             place: self.options.place,
             latency: self.latency.clone(),
             stop: self.options.stop.clone(),
+            skip_bad: self.options.skip_bad,
             ..ScanOptions::for_station(&self.settings, &self.rig, scan)
         };
         let report = scan_recording(&Recording::open(recording)?, None, &self.rig, &run, |_, _| {})?;
-        let report = report.timeless(&format!("sha256:{}", row.input));
+        let mut report = report.timeless(&format!("sha256:{}", row.input));
+        let here = recording.to_string_lossy();
+        report.skipped.iter_mut().for_each(|(_, why)| *why = why.replace(&*here, "recording"));
         let text = serde_json::to_string_pretty(&report).expect("plain data");
         crate::files::write(&scan.join("scan.json"), text.as_bytes())?;
         crate::station::judge::page::save(scan, None, &[])?;
@@ -151,12 +154,13 @@ impl Bench<'_> {
     }
 }
 
-/// The problem without what holds only for a scan of its own: a batch keeps no part of a scan and excludes no picture.
+/// The problem without what holds only for a scan of its own: a batch keeps no part of a scan and does not resume one.
 fn in_a_batch(problem: Problem) -> Problem {
     let Problem { what, cause, next } = problem;
     let what = what.split("; the first ").next().unwrap_or_default().to_owned();
     let next = if next.contains("--resume") {
-        "copy the recording again and make the manifest anew, or scan it alone with sheetlight scan --skip-bad".into()
+        "copy the recording again and make the manifest anew, or run the batch with --skip-bad into another --out"
+            .into()
     } else {
         next
     };
