@@ -197,9 +197,14 @@ mod tests {
                 let task = Task { scene, width: 640, height: 480, bits };
                 let (numbers, a) = answered(&task, scenario);
                 assert_eq!(numbers, [0, 1, 2]);
-                // Spots that touch the line pull its points; the other pictures show nothing but the line.
-                let spots = scene == SceneKind::Reflections;
-                let [least, rms, wrong] = if spots { [0.9, 0.25, 0.12] } else { [0.98, 0.05, 0.001] };
+                // Spots that touch the line pull its points. A slanted line leaves the picture at two borders, where
+                // single points are off by a pixel.
+                let [least, rms, wrong] = match scene {
+                    SceneKind::Reflections => [0.9, 0.25, 0.12],
+                    SceneKind::Slanted => [0.98, 0.15, 0.002],
+                    _ => [0.98, 0.05, 0.001],
+                };
+                assert!(a.median_px.unwrap() < 0.015, "{} {a:?}", task.name());
                 assert!(a.found.unwrap() > least && a.rms_px.unwrap() < rms, "{} {a:?}", task.name());
                 assert!(a.false_share.unwrap() < wrong, "{} {a:?}", task.name());
             }

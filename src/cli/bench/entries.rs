@@ -27,7 +27,7 @@ pub enum Command {
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight bench run --entry 'cpu=sheetlight bench entry --on cpu' --out results.json
-  sheetlight bench run --entry 'cpu=sheetlight bench entry --on cpu' --entry 'mine=python3 mine.py' --out results.json
+  sheetlight bench run --entry 'cpu=sheetlight bench entry' --entry 'mine=python3 mine.py' --out r.json
 Guide: docs/benchmark.md")]
 pub struct RunArgs {
     /// NAME=COMMAND of a program; may be repeated. {scene}, {size}, {bits}, {scenario} in it: open division
