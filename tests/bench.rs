@@ -39,7 +39,7 @@ fn entries_take_turns_and_what_breaks_the_format_is_named() {
     let pipe = format!("pipe={PROGRAM} bench entry --nothing");
     let bad = [
         ("dies", script(at, "dies", "exit 3"), "it ended with exit status: 3"),
-        ("mute", "mute=true".to_owned(), "its first line \"\" is not JSON"),
+        ("mute", "mute=true".to_owned(), "it wrote no first line"),
         ("chatty", "chatty=echo hello".to_owned(), "its first line \"hello"),
         // Number 7 where 0 is next, without points.
         ("other", script(at, "other", r"printf '\007\0\0\0\0\0\0\0'; cat > rest"), "it answered picture 7 where 0"),
@@ -50,6 +50,7 @@ fn entries_take_turns_and_what_breaks_the_format_is_named() {
         ),
         ("short", script(at, "short", r"printf '\0\0\0\0\1\0\0\0xyz'; exit 0"), "its output ends within 1 points"),
         ("speaks", script(at, "speaks", "echo no licence >&2; exit 1"), "stderr: no licence"),
+        ("prints", script(at, "prints", "echo found 12 points; cat > rest"), "these bytes are text: \"found 12\""),
         ("absent", "absent=/no/such/program".to_owned(), "not found"),
     ];
     let mut words = vec!["run", "--scene", "clean", "--rounds", "2", "--seconds", "0.05", "--out", "r.json"];
@@ -57,7 +58,11 @@ fn entries_take_turns_and_what_breaks_the_format_is_named() {
     words.extend(["--scenario", "camera", "--scenario", "streams", "--rate", "50"]);
     let all = [&cpu, &open, &pipe].into_iter().chain(bad.iter().map(|b| &b.1));
     words.extend(all.flat_map(|entry| ["--entry", entry.as_str()]));
-    let table = done(at, &words);
+    let out = bench(at, &words);
+    let said = String::from_utf8_lossy(&out.stderr).into_owned();
+    // Programs that failed are no success, and the others are stored.
+    assert!(out.status.code() == Some(1) && said.contains("36 of 48 rows have no result"), "{said}");
+    let table = String::from_utf8(out.stdout).unwrap();
     let results: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(at.join("r.json")).unwrap()).unwrap();
     for scenario in ["single", "offline", "camera", "streams"] {
@@ -102,13 +107,59 @@ fn entries_take_turns_and_what_breaks_the_format_is_named() {
     let rules = bench(at, &["verify", "r.json"]);
     let found = String::from_utf8(rules.stdout).unwrap();
     assert_eq!(rules.status.code(), Some(1));
-    for want in ["2 rounds, 9 are needed", "no row for dim, speckle, thick"] {
+    for want in ["rows have 2 rounds or more, 9 are needed", "no row for dim, speckle, thick"] {
         assert!(found.contains(want), "{found}");
     }
     assert!(!found.contains("were others") && !found.contains("not described"), "{found}");
     done(at, &["html", "r.json", "--out", "r.html"]);
     let page = std::fs::read_to_string(at.join("r.html")).unwrap();
     assert!(page.contains("open (open)") && page.contains("stderr: no licence"), "{page}");
+}
+
+#[test]
+fn a_program_that_does_not_answer_is_named_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let keeps = script(at, "keeps", "cat > rest");
+    let short = script(at, "short", r"printf '\0\0\0\0\1\0\0\0abcd'; cat > rest");
+    let mut words = vec!["run", "--scene", "clean", "--scene", "dark", "--size", "64x64", "--scenario", "single"];
+    words.extend(["--rounds", "1", "--timeout", "0.5", "--out", "r.json", "--entry", &keeps, "--entry", &short]);
+    let out = bench(at, &words);
+    assert_eq!(out.status.code(), Some(1));
+    let results: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(at.join("r.json")).unwrap()).unwrap();
+    let failed = |i: usize| results["rows"][i]["failed"].as_str().unwrap().to_owned();
+    assert_eq!(failed(0), "no reply in 0.5 s, 0 bytes came: is its output flushed?");
+    assert!(failed(1).contains("no reply in 0.5 s, 12 bytes came of a reply that is too short"), "{}", failed(1));
+    assert!(failed(2).starts_with("not run after clean 64x64 8 bit: no reply"), "{}", failed(2));
+}
+
+/// What counts is what was returned in all rounds: an entry that works in one round of eight, or copies one good point,
+/// gains nothing.
+#[test]
+fn rounds_without_points_are_scored_too() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    // Passes everything through to a real entry and throws its points away after the two passes before the rounds.
+    let lazy = format!("lazy=sh -c '{PROGRAM} bench entry --on cpu | python3 lazy.py'");
+    std::fs::write(
+        at.join("lazy.py"),
+        "import sys\n\
+         source, sink = sys.stdin.buffer, sys.stdout.buffer\n\
+         sink.write(source.readline())\n\
+         sink.flush()\n\
+         answered = 0\n\
+         while head := source.read(8):\n    \
+             points = source.read(24 * int.from_bytes(head[4:], 'little'))\n    \
+             answered += 1\n    \
+             sink.write(head + points if answered <= 100 else head[:4] + bytes(4))\n    \
+             sink.flush()\n",
+    )
+    .unwrap();
+    let mut words = vec!["run", "--scene", "clean", "--size", "320x240", "--scenario", "offline"];
+    words.extend(["--rounds", "4", "--seconds", "0.05", "--out", "r.json", "--entry", &lazy]);
+    let table = done(at, &words);
+    assert!(table.contains("does not count: "), "{table}");
 }
 
 #[test]
@@ -151,6 +202,9 @@ fn wrong_options_and_files_are_refused() {
     run(&["--entry", "a=true", "--size", "8x8"], "64 to 8192");
     run(&["--entry", "a=true", "--bits", "7"], "7");
     run(&["--entry", "a=true", "--rate", "0"], "pictures a second");
+    run(&["--entry", "a=true", "--timeout", "0"], "a timeout of 0 s");
+    run(&["--entry", "a=true", "--scene", "clen"], "unknown scene 'clen': clean, dim, speckle");
+    run(&["--entry", "a=true", "--scenario", "live"], "unknown scenario 'live': single, offline, camera, streams");
     std::fs::write(at.join("x.json"), "{}").unwrap();
     refused(&["verify", "x.json"], "is not a result of the benchmark");
     refused(&["compare", "none.json", "a", "b"], "none.json");

@@ -103,7 +103,8 @@ fn family(process: u32) -> Vec<u32> {
     let mut next = 0;
     while let Some(&pid) = all.get(next) {
         let tasks = std::fs::read_dir(format!("/proc/{pid}/task")).into_iter().flatten().flatten();
-        let children = tasks.filter_map(|t| std::fs::read_to_string(t.path().join("children")).ok());
+        let tasks = tasks.map(|t| t.file_name().to_string_lossy().into_owned());
+        let children = tasks.filter_map(|t| std::fs::read_to_string(format!("/proc/{pid}/task/{t}/children")).ok());
         let text: String = children.collect();
         all.extend(text.split_whitespace().filter_map(|c| c.parse::<u32>().ok()));
         next += 1;

@@ -2,22 +2,37 @@
 //! their own. Frame and unit: none.
 
 use super::super::machine;
-use super::wire::{Found, Header, Hello, read_points};
+use super::wire::{Found, Header, Hello, astray, read_points};
 use crate::fault::{Fault, Result};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::time::{Duration, Instant};
 
-/// Longest wait for an entry's first line, and for the points of any picture.
-pub(super) const PATIENCE: Duration = Duration::from_secs(120);
 /// Pictures that wait in the driver while one is being sent.
 const QUEUE: usize = 2;
 /// Replies that may wait in the driver.
 const REPLIES: usize = 1 << 16;
+/// Bytes of standard error that are read; a program that writes more says nothing in a message.
+const MOST_ERRORS: u64 = 1 << 24;
 /// Characters of standard error that a message repeats.
 const TAIL: usize = 400;
+
+/// Counts what is read.
+struct Counted<R> {
+    inner: R,
+    bytes: Arc<AtomicU64>,
+}
+
+impl<R: Read> Read for Counted<R> {
+    fn read(&mut self, to: &mut [u8]) -> std::io::Result<usize> {
+        let n = self.inner.read(to)?;
+        self.bytes.fetch_add(n as u64, Ordering::Relaxed);
+        Ok(n)
+    }
+}
 
 /// The points of one picture.
 pub(super) struct Reply {
@@ -31,11 +46,16 @@ type Sent = (u32, Arc<Vec<u8>>);
 
 /// A running entry.
 pub(super) struct Running {
-    name: String,
     child: Child,
     /// `None` once the input is closed.
     pictures: Option<SyncSender<Sent>>,
     replies: Receiver<std::result::Result<Reply, String>>,
+    /// Bytes that came, and those of them that belong to replies and to the first line.
+    bytes: Arc<AtomicU64>,
+    replied: u64,
+    hello_bytes: u64,
+    /// Longest wait for the first line, and for the points of any picture.
+    patience: Duration,
     errors: tempfile::NamedTempFile,
     /// What the program says of itself.
     pub hello: Hello,
@@ -56,9 +76,9 @@ fn shell(command: &str) -> Command {
 
 impl Running {
     /// Starts an entry, sends the header and waits for its first line.
-    pub fn start(name: &str, command: &str, header: &Header) -> Result<Running> {
+    pub fn start(command: &str, header: &Header, patience: Duration) -> Result<Running> {
         let failed = |e: std::io::Error| {
-            Fault::input(format!("entry {name}: {command}: cannot be run ({e})"))
+            Fault::input(format!("{command}: cannot be run ({e})"))
                 .cause("the command names no program")
                 .next("try the command in a shell")
         };
@@ -84,14 +104,18 @@ impl Running {
             }
         };
         std::thread::Builder::new().name("to entry".into()).spawn(write).map_err(failed)?;
-        let (say, hellos) = sync_channel(1);
+        let (say, hellos) = sync_channel::<std::result::Result<(Hello, usize), String>>(1);
         let (reply, replies) = sync_channel(REPLIES);
+        let bytes = Arc::new(AtomicU64::new(0));
+        let counted = Counted { inner: output, bytes: bytes.clone() };
         let read = move || {
-            let mut output = BufReader::with_capacity(1 << 16, output);
+            let mut output = BufReader::with_capacity(1 << 16, counted);
             let mut line = String::new();
             let read = output.by_ref().take(65_536).read_line(&mut line);
-            let hello = read.map_err(|e| e.to_string()).and_then(|_| {
-                serde_json::from_str::<Hello>(&line).map_err(|e| format!("its first line {line:?} is not JSON ({e})"))
+            let hello = read.map_err(|e| e.to_string()).and_then(|n| match serde_json::from_str::<Hello>(&line) {
+                Ok(hello) => Ok((hello, n)),
+                Err(_) if n == 0 => Err("it wrote no first line".into()),
+                Err(e) => Err(format!("its first line {line:?} is not JSON ({e})")),
             });
             let good = hello.is_ok();
             if say.send(hello).is_err() || !good {
@@ -110,13 +134,22 @@ impl Running {
             }
         };
         std::thread::Builder::new().name("from entry".into()).spawn(read).map_err(failed)?;
-        let hello = hellos.recv_timeout(PATIENCE);
-        let mut running =
-            Running { name: name.to_owned(), child, pictures: Some(send), replies, errors, hello: Hello::default() };
-        running.hello = match hello {
-            Ok(Ok(hello)) => hello,
+        let hello = hellos.recv_timeout(patience);
+        let mut running = Running {
+            child,
+            pictures: Some(send),
+            replies,
+            bytes,
+            replied: 0,
+            hello_bytes: 0,
+            patience,
+            errors,
+            hello: Hello::default(),
+        };
+        (running.hello, running.hello_bytes) = match hello {
+            Ok(Ok((hello, bytes))) => (hello, bytes as u64),
             Ok(Err(what)) => return Err(running.fault(&what)),
-            Err(_) => return Err(running.fault(&format!("no first line in {} s", PATIENCE.as_secs()))),
+            Err(_) => return Err(running.fault(&format!("no first line in {} s", patience.as_secs_f64()))),
         };
         Ok(running)
     }
@@ -131,12 +164,12 @@ impl Running {
             ended = self.child.try_wait().ok().flatten();
         }
         let ended = ended.map_or_else(String::new, |status| format!("; it ended with {status}"));
-        let errors = std::fs::read(self.errors.path()).unwrap_or_default();
+        let errors = crate::files::read(self.errors.path(), MOST_ERRORS).unwrap_or_default();
         let errors = String::from_utf8_lossy(&errors);
         let errors = errors.trim();
         let from = errors.char_indices().rev().nth(TAIL - 1).map_or(0, |(i, _)| i);
         let errors = if errors.is_empty() { String::new() } else { format!("; stderr: {}", &errors[from..]) };
-        Fault::input(format!("entry {}: {what}{ended}{errors}", self.name))
+        Fault::input(format!("{what}{ended}{errors}"))
             .cause("the program stopped, or its replies are not in the format of docs/benchmark.md")
             .next("compare what it reads and writes with that document")
     }
@@ -169,10 +202,16 @@ impl Running {
     /// The next reply; `None` if there is none yet and `wait` is over.
     fn reply(&mut self, wait: Duration) -> Result<Option<Reply>> {
         match self.replies.recv_timeout(wait) {
-            Ok(Ok(reply)) => Ok(Some(reply)),
+            Ok(Ok(reply)) => {
+                self.replied += 8 + 24 * reply.points.len() as u64;
+                Ok(Some(reply))
+            }
             Ok(Err(what)) => Err(self.fault(&what)),
-            Err(RecvTimeoutError::Timeout) if wait >= PATIENCE => {
-                Err(self.fault(&format!("no reply in {} s", PATIENCE.as_secs())))
+            Err(RecvTimeoutError::Timeout) if wait >= self.patience => {
+                let came = self.bytes.load(Ordering::Relaxed).saturating_sub(self.hello_bytes + self.replied);
+                let why = if came == 0 { ": is its output flushed?" } else { " of a reply that is too short" };
+                let seconds = self.patience.as_secs_f64();
+                Err(self.fault(&format!("no reply in {seconds} s, {came} bytes came{why}")))
             }
             Err(RecvTimeoutError::Timeout) => Ok(None),
             Err(RecvTimeoutError::Disconnected) => {
@@ -184,9 +223,7 @@ impl Running {
     /// The next reply, which must be to picture `number`; `None` if there is none yet and `wait` is over.
     pub fn reply_to(&mut self, number: u32, wait: Duration) -> Result<Option<Reply>> {
         match self.reply(wait)? {
-            Some(reply) if reply.number != number => {
-                Err(self.fault(&format!("it answered picture {} where {number} was next", reply.number)))
-            }
+            Some(reply) if reply.number != number => Err(self.fault(&astray(reply.number, number))),
             other => Ok(other),
         }
     }

@@ -96,6 +96,8 @@ mod tests {
             driver: "0".into(),
             started: String::new(),
             machine: Machine::default(),
+            rounds: 9,
+            seconds: 1.0,
             entries: vec![entry("a"), entry("b")],
             rows,
         }

@@ -2,7 +2,7 @@
 //! Frame and unit: ms a picture, px, mm, MB.
 
 use super::result::{Accuracy, Results, RowOf};
-use super::scene::Task;
+use super::scene::{SceneKind, Task};
 use super::wire::Scenario;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -54,7 +54,10 @@ fn row(run: &Results, row: &RowOf, slowest: f64) -> Markup {
             td { (number(per_cent(|a| a.found), 1)) }
             td { (number(of(|a| a.median_px), 3)) " / " (number(of(|a| a.rms_px), 3)) }
             td { (number(of(|a| a.rms_mm), 4)) }
-            td { (number(per_cent(|a| a.false_share), 2)) }
+            td {
+                @if row.task.scene == SceneKind::Dark { (number(of(|a| Some(a.false_a_picture)), 1)) " a picture" }
+                @else { (number(per_cent(|a| a.false_share), 2)) }
+            }
             td { (number(per_cent(|a| a.beyond_three_sigma), 2)) }
             td { (number(row.memory_mb, 0)) }
             td style="text-align:left" { (against.join("; ")) }
@@ -79,6 +82,35 @@ fn section(run: &Results, task: &Task, scenario: Scenario) -> Markup {
     }
 }
 
+/// One cell of the summary: time and accuracy of an entry at a task, the fastest that counts in bold.
+fn cell(row: Option<&RowOf>, fastest: Option<&str>) -> Markup {
+    let Some(row) = row else { return html! { td { "–" } } };
+    if !row.against().is_empty() {
+        return html! { td.out title=(row.against().join("; ")) { "does not count" } };
+    }
+    let rms = row.accuracy.as_ref().and_then(|a| a.rms_px);
+    let time = row.ms().or_else(|| row.latency_ms().map(|l| l[0]));
+    let text = format!("{} ms, {} px", three(time), number(rms, 3));
+    html! { td { @if fastest == Some(row.entry.as_str()) { b { (text) } } @else { (text) } } }
+}
+
+/// Every entry at every task.
+fn summary(run: &Results, sections: &[(Task, Scenario)]) -> Markup {
+    html! {
+        table {
+            tr { th { "pictures" } @for e in &run.entries { th { (e.name) } } }
+            @for (task, scenario) in sections {
+                @let rows = ranked(run, task, *scenario);
+                @let fastest = rows.iter().find(|r| r.against().is_empty()).map(|r| r.entry.as_str());
+                tr {
+                    td { (task.name()) ", " (scenario.name()) }
+                    @for e in &run.entries { (cell(rows.iter().find(|r| r.entry == e.name).copied(), fastest)) }
+                }
+            }
+        }
+    }
+}
+
 fn of_run(name: &str, run: &Results) -> Markup {
     let m = &run.machine;
     let mut sections: Vec<(Task, Scenario)> = Vec::new();
@@ -94,6 +126,7 @@ fn of_run(name: &str, run: &Results) -> Markup {
             @if let Some(mb) = m.memory_mb { (mb) " MB, " }
             (m.system) "; " (run.started) "; driver " (run.driver)
             @if let Some(load) = m.load { "; load before the run " (load) }
+            "; " (run.rounds) " rounds of at least " (run.seconds) " s"
         }
         table {
             tr { th { "entry" } th style="text-align:left" { "program" } th style="text-align:left" { "command" } }
@@ -107,7 +140,8 @@ fn of_run(name: &str, run: &Results) -> Markup {
                 }
             }
         }
-        @for (task, scenario) in sections { (section(run, &task, scenario)) }
+        (summary(run, &sections))
+        @for (task, scenario) in &sections { (section(run, task, *scenario)) }
     }
 }
 
@@ -128,7 +162,7 @@ pub fn page(runs: &[(String, Results)]) -> String {
                     "Programs read the same pictures of a laser stripe in turns and return points. "
                     "Times are medians of the rounds. "
                     "Distances are measured from the exact line of the same pictures. "
-                    "Grey rows do not count: their points are too few or too wrong. "
+                    "Grey rows do not count, for the reason that they name. "
                     "The rules stand in docs/benchmark.md."
                 }
                 @for (name, run) in runs { (of_run(name, run)) }
@@ -161,6 +195,8 @@ mod tests {
             driver: "0".into(),
             started: String::new(),
             machine: Machine::default(),
+            rounds: 9,
+            seconds: 1.0,
             entries: vec![entry("fast & wrong", "x < y"), entry("slow", "s {scene}")],
             rows: vec![wrong, slow],
         };

@@ -30,6 +30,10 @@ pub struct Results {
     pub started: String,
     /// The machine.
     pub machine: Machine,
+    /// Rounds that were asked for.
+    pub rounds: usize,
+    /// Least duration of a round, s.
+    pub seconds: f64,
     /// The entries, in the order of their turns.
     pub entries: Vec<EntryOf>,
     /// One row for each task, scenario and entry.
@@ -82,7 +86,7 @@ pub struct RowOf {
     pub rate_hz: Option<f64>,
     /// The rounds; round i of every entry of a task ran after round i - 1 of all.
     pub rounds: Vec<Round>,
-    /// From the pictures of the last round.
+    /// From replies of all rounds, chosen by chance.
     pub accuracy: Option<Accuracy>,
     /// Most memory of the process and its children, MB.
     pub memory_mb: Option<f64>,
@@ -125,11 +129,11 @@ pub struct Accuracy {
     pub points_a_picture: f64,
     /// Share of the lines' columns with a point within 1 px; `None` if there is no line.
     pub found: Option<f64>,
-    /// Share of the points that lie more than 3 px from every line.
+    /// Points more than 3 px from every line, as a share of these and of the columns with a point on a line.
     pub false_share: Option<f64>,
     /// Number of such points a picture.
     pub false_a_picture: f64,
-    /// Median distance of the other points from the line, px.
+    /// Median distance of the other points from the line, px: means over the points of a column.
     pub median_px: Option<f64>,
     /// Root mean square of that distance, px.
     pub rms_px: Option<f64>,
@@ -148,9 +152,10 @@ pub(super) fn median(numbers: impl IntoIterator<Item = f64>) -> f64 {
 }
 
 impl RowOf {
-    /// Wall time a picture, ms: the median of the rounds.
+    /// Wall time a picture, ms: the median of the rounds; `None` for `Camera`, where it is the camera's.
     pub fn ms(&self) -> Option<f64> {
-        (!self.rounds.is_empty()).then(|| median(self.rounds.iter().map(Round::ms)))
+        (!self.rounds.is_empty() && self.scenario != Scenario::Camera)
+            .then(|| median(self.rounds.iter().map(Round::ms)))
     }
 
     /// CPU time a picture, ms: the median of the rounds.
@@ -188,6 +193,9 @@ impl RowOf {
             above("false points a picture", a.false_a_picture, MOST_DARK, 1.0, "");
             return why;
         }
+        if a.points_a_picture == 0.0 {
+            return vec!["no points returned".into()];
+        }
         above("false points", a.false_share.unwrap_or(f64::NAN), MOST_FALSE, 100.0, "%");
         above("rms", a.rms_px.unwrap_or(f64::NAN), MOST_RMS_PX, 1.0, "px");
         above("rms of X, Y, Z", a.rms_mm.unwrap_or(f64::NAN), MOST_RMS_MM, 1.0, "mm");
@@ -221,19 +229,20 @@ impl Results {
 
 /// This machine.
 pub(super) fn machine() -> Machine {
-    let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
+    let text = |read: std::io::Result<String>| read.unwrap_or_default();
     let after = |text: &str, key: &str| {
         let line = text.lines().find(|l| l.starts_with(key))?;
         Some(line.split_once(':')?.1.trim().to_owned())
     };
-    let kernel = read("/proc/sys/kernel/osrelease");
-    let memory = after(&read("/proc/meminfo"), "MemTotal");
+    let kernel = text(std::fs::read_to_string("/proc/sys/kernel/osrelease"));
+    let memory = after(&text(std::fs::read_to_string("/proc/meminfo")), "MemTotal");
     Machine {
-        processor: after(&read("/proc/cpuinfo"), "model name").unwrap_or_else(|| std::env::consts::ARCH.into()),
+        processor: after(&text(std::fs::read_to_string("/proc/cpuinfo")), "model name")
+            .unwrap_or_else(|| std::env::consts::ARCH.into()),
         threads: std::thread::available_parallelism().map_or(1, |n| n.get()),
         memory_mb: memory.and_then(|m| Some(m.split_whitespace().next()?.parse::<u64>().ok()? / 1024)),
         system: format!("{} {}", std::env::consts::OS, kernel.trim()).trim().to_owned(),
-        load: read("/proc/loadavg").split_whitespace().next().and_then(|l| l.parse().ok()),
+        load: text(std::fs::read_to_string("/proc/loadavg")).split_whitespace().next().and_then(|l| l.parse().ok()),
     }
 }
 
@@ -296,6 +305,7 @@ pub(super) mod tests {
         assert_eq!(with(|a| a.rms_mm = Some(f64::NAN)), 1);
         assert_eq!(with(|a| a.found = Some(0.79)), 1);
         assert_eq!(with(|a| (a.found, a.rms_px, a.rms_mm, a.false_share) = (None, None, None, None)), 4);
+        assert_eq!(with(|a| a.points_a_picture = 0.0), 1);
         assert_eq!(RowOf { accuracy: None, ..good() }.against(), ["no accuracy"]);
         assert_eq!(RowOf { failed: Some("died".into()), ..good() }.against(), ["died"]);
         let dark = Task { scene: SceneKind::Dark, ..good().task };

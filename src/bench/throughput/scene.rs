@@ -20,7 +20,7 @@ use crate::geometry::{Camera, Plane, Vec2, Vec3};
     strum::VariantArray,
 )]
 #[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum SceneKind {
     /// One curved stripe with a step.
     Clean,
@@ -40,6 +40,10 @@ pub enum SceneKind {
     TenthLit,
     /// No stripe: background and noise alone.
     Dark,
+}
+
+fn unknown(word: &str) -> String {
+    crate::fault::unknown::<SceneKind>("scene", word)
 }
 
 impl SceneKind {

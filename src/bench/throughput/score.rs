@@ -8,6 +8,8 @@ use crate::geometry::Vec3;
 
 /// A point farther than this from every line is false, px.
 pub(super) const FALSE_PX: f64 = 3.0;
+/// Smaller standard deviations are no statement, px; nor are those beyond the limit of a false point.
+const MOST_SURE: f64 = 1e-4;
 /// A column of a line is found if a point lies this near, px.
 const FOUND_PX: f64 = 1.0;
 
@@ -19,10 +21,20 @@ pub(super) struct Score {
     false_points: u64,
     columns: u64,
     columns_found: u64,
-    px: Vec<f64>,
+    /// Mean square distances of the columns that have points, px squared and mm squared.
+    px2: Vec<f64>,
     mm2: f64,
     stated: u64,
     beyond_three_sigma: u64,
+}
+
+/// The points at one column of a line.
+#[derive(Clone, Copy, Default)]
+struct Column {
+    points: f64,
+    found: bool,
+    px2: f64,
+    mm2: f64,
 }
 
 /// The foot of a point on a line: its column, and the signed distance, px.
@@ -39,7 +51,8 @@ impl Score {
     /// Adds the points of picture `number`.
     pub fn add(&mut self, task: &Task, number: u32, points: &[Found]) {
         let lines = task.lines(number);
-        let mut found: Vec<Vec<bool>> = lines.iter().map(|l| vec![false; (l.to - l.from) as usize + 1]).collect();
+        let mut columns: Vec<Vec<Column>> =
+            lines.iter().map(|l| vec![Column::default(); (l.to - l.from) as usize + 1]).collect();
         self.pictures += 1;
         for p in points {
             self.points += 1;
@@ -49,37 +62,44 @@ impl Score {
                 self.false_points += 1;
                 continue;
             };
-            self.px.push(off);
-            let column = (at - lines[i].from).round();
-            if off.abs() <= FOUND_PX && column >= 0.0 && (column as usize) < found[i].len() {
-                found[i][column as usize] = true;
-            }
+            // A column counts once, however many points it has: copies of a good one change nothing.
+            let last = columns[i].len() - 1;
+            let column = &mut columns[i][((at - lines[i].from).round().max(0.0) as usize).min(last)];
             let xyz = Vec3::from(p.xyz.map(f64::from));
             // A point that is no number counts as a metre away.
             let mm = task.point(at, lines[i].row(at)).map_or(0.0, |truth| (xyz - truth).norm());
-            self.mm2 += if mm.is_finite() { mm * mm } else { 1e6 };
-            if p.sigma_px.is_finite() {
+            column.points += 1.0;
+            column.found |= off.abs() <= FOUND_PX;
+            column.px2 += off * off;
+            column.mm2 += if mm.is_finite() { (mm * mm).min(1e6) } else { 1e6 };
+            if (MOST_SURE..=FALSE_PX).contains(&f64::from(p.sigma_px)) {
                 self.stated += 1;
                 self.beyond_three_sigma += u64::from(off.abs() > 3.0 * f64::from(p.sigma_px));
             }
         }
-        self.columns += found.iter().map(|f| f.len() as u64).sum::<u64>();
-        self.columns_found += found.iter().flatten().filter(|f| **f).count() as u64;
+        for column in columns.iter().flatten() {
+            self.columns += 1;
+            self.columns_found += u64::from(column.found);
+            if column.points > 0.0 {
+                self.px2.push(column.px2 / column.points);
+                self.mm2 += column.mm2 / column.points;
+            }
+        }
     }
 
     /// The figures.
     pub fn accuracy(&self) -> Accuracy {
         let share = |part: u64, of: u64| if of == 0 { None } else { Some(part as f64 / of as f64) };
-        let on_line = self.px.len() as f64;
-        let mut sizes: Vec<f64> = self.px.iter().map(|e| e.abs()).collect();
-        sizes.sort_by(f64::total_cmp);
-        let rms = (self.px.iter().map(|e| e * e).sum::<f64>() / on_line).sqrt();
+        let on_line = self.px2.len() as f64;
+        let mut squares = self.px2.clone();
+        squares.sort_by(f64::total_cmp);
+        let rms = (squares.iter().sum::<f64>() / on_line).sqrt();
         Accuracy {
             points_a_picture: self.points as f64 / self.pictures.max(1) as f64,
             found: share(self.columns_found, self.columns),
-            false_share: share(self.false_points, self.points),
+            false_share: share(self.false_points, self.false_points + self.px2.len() as u64),
             false_a_picture: self.false_points as f64 / self.pictures.max(1) as f64,
-            median_px: sizes.get(sizes.len() / 2).copied(),
+            median_px: squares.get(squares.len() / 2).map(|e2| e2.sqrt()),
             rms_px: (on_line > 0.0).then_some(rms),
             rms_mm: (on_line > 0.0).then(|| (self.mm2 / on_line).sqrt()),
             beyond_three_sigma: share(self.beyond_three_sigma, self.stated),
@@ -144,11 +164,20 @@ mod tests {
         // Points that are off by 1.5 px are no longer "found", and not yet false.
         let near = scored(&task, &points(&task, 0, 1.5));
         assert_eq!((near.found, near.false_share), (Some(0.0), Some(0.0)));
+        // Copies of one point, good or bad, change nothing.
+        let mut copies = points(&task, 0, 0.2);
+        let once = scored(&task, &copies);
+        copies.extend(vec![copies[7]; 20_000]);
+        let often = scored(&task, &copies);
+        assert!((often.rms_px.unwrap() - once.rms_px.unwrap()).abs() < 1e-9 && often.found == once.found);
         let nan = Found { u: f32::NAN, v: 1.0, sigma_px: 0.1, xyz: [f32::NAN; 3] };
         assert_eq!(scored(&task, &[nan]).false_share, Some(1.0));
         let mut lost = points(&task, 0, 0.0);
         lost[3].xyz = [f32::NAN; 3];
         assert!(scored(&task, &lost).rms_mm.unwrap() > 30.0);
+        let mut sure = points(&task, 0, 0.2);
+        sure.iter_mut().for_each(|p| p.sigma_px = 1e9);
+        assert_eq!(scored(&task, &sure).beyond_three_sigma, None);
         let dark = Task { scene: SceneKind::Dark, ..task };
         let nothing = scored(&dark, &points(&task, 0, 0.0));
         assert_eq!((nothing.found, nothing.false_share, nothing.false_a_picture), (None, Some(1.0), all as f64));

@@ -5,8 +5,9 @@ use super::result::{Results, RowOf};
 use super::scene::{SceneKind, Task};
 use strum::VariantArray;
 
-/// Rounds that a result needs.
+/// Rounds that a result needs, and the least duration of each, s.
 const LEAST_ROUNDS: usize = 9;
+const LEAST_S: f64 = 1.0;
 /// Most waiting processes before the run.
 const MOST_LOAD: f64 = 0.5;
 
@@ -46,6 +47,16 @@ pub fn verify(results: &Results, mut progress: impl FnMut(&str)) -> Vec<String> 
         let other = results.rows.iter().filter(|r| r.task == **task && r.pictures_sha256 != hash);
         found.extend(other.map(|r| format!("{}: the pictures of {} were others", task.name(), r.entry)));
     }
+    let short = results.rows.iter().filter(|r| r.failed.is_none() && r.rounds.len() < LEAST_ROUNDS);
+    let short: Vec<usize> = short.map(|r| r.rounds.len()).collect();
+    if let Some(least) = short.iter().min() {
+        found.push(format!("{} rows have {least} rounds or more, {LEAST_ROUNDS} are needed", short.len()));
+    }
+    let brief = |r: &&RowOf| r.rounds.iter().any(|round| round.wall_s < 0.9 * LEAST_S);
+    let brief = results.rows.iter().filter(brief).count();
+    if brief > 0 {
+        found.push(format!("{brief} rows have rounds of less than {LEAST_S} s"));
+    }
     results.rows.iter().for_each(|row| found.extend(of_row(results, row)));
     for entry in &results.entries {
         let scenes: Vec<SceneKind> =
@@ -64,9 +75,6 @@ fn of_row(results: &Results, row: &RowOf) -> Vec<String> {
     if !results.entries.iter().any(|e| e.name == row.entry) {
         found.push(format!("{name}: the entry's command is not stated"));
     }
-    if row.failed.is_none() && row.rounds.len() < LEAST_ROUNDS {
-        found.push(format!("{name}: {} rounds, {LEAST_ROUNDS} are needed", row.rounds.len()));
-    }
     if row.rounds.iter().any(|r| r.pictures == 0 || r.wall_s.is_nan() || r.wall_s <= 0.0) {
         found.push(format!("{name}: a round without pictures or without time"));
     }
@@ -79,14 +87,15 @@ fn of_row(results: &Results, row: &RowOf) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::super::result::tests::good;
-    use super::super::result::{EntryOf, Machine};
+    use super::super::result::{EntryOf, Machine, Round};
     use super::*;
 
     /// A run of all scenes that keeps the rules.
     fn right() -> Results {
         let task = |scene| Task { scene, width: 64, height: 64, bits: 8 };
         let row = |scene: &SceneKind| {
-            let rounds = std::iter::repeat_n(good().rounds[0].clone(), LEAST_ROUNDS).collect();
+            let round = Round { wall_s: 1.01, ..good().rounds[0].clone() };
+            let rounds = std::iter::repeat_n(round, LEAST_ROUNDS).collect();
             let pictures_sha256 = drawing::hash(&drawing::pictures(&task(*scene)));
             RowOf { task: task(*scene), pictures_sha256, rounds, ..good() }
         };
@@ -102,6 +111,8 @@ mod tests {
             driver: "0".into(),
             started: "2026-11-29T10:00:00Z".into(),
             machine,
+            rounds: 9,
+            seconds: 1.0,
             entries: vec![EntryOf { name: "a".into(), command: "a".into(), closed: true, says: None }],
             rows: SceneKind::VARIANTS.iter().map(row).collect(),
         }
@@ -117,7 +128,8 @@ mod tests {
         assert_eq!(problems(&|_| ()), "");
         let digit = |r: &mut Results| r.rows[3].pictures_sha256.replace_range(..1, "x");
         assert!(problems(&digit).contains("thick 64x64 8 bit: the pictures of a were others"));
-        assert!(problems(&|r| r.rows[0].rounds.truncate(8)).contains("8 rounds, 9 are needed"));
+        assert!(problems(&|r| r.rows[0].rounds.truncate(8)).contains("1 rows have 8 rounds or more, 9 are needed"));
+        assert!(problems(&|r| r.rows[0].rounds[3].wall_s = 0.5).contains("1 rows have rounds of less than 1 s"));
         assert!(problems(&|r| r.rows.truncate(8)).contains("no row for dark"));
         assert!(problems(&|r| r.machine.load = Some(1.2)).contains("1.2 processes waited"));
         assert!(problems(&|r| r.machine.load = None).contains("not stated"));

@@ -24,7 +24,7 @@ const MOST_POINTS: u32 = 1 << 22;
     strum::VariantArray,
 )]
 #[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
+#[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Scenario {
     /// The next picture is sent when the points of the last one have arrived.
     Single,
@@ -34,6 +34,10 @@ pub enum Scenario {
     Camera,
     /// As `Offline`, with four processes of the entry at once.
     Streams,
+}
+
+fn unknown(word: &str) -> String {
+    crate::fault::unknown::<Scenario>("scenario", word)
 }
 
 impl Scenario {
@@ -161,7 +165,8 @@ pub(super) fn read_points(output: &mut impl Read) -> std::result::Result<Option<
     let word = |b: &[u8]| u32::from_le_bytes([b[0], b[1], b[2], b[3]]);
     let (number, count) = (word(&head), word(&head[4..]));
     if count > MOST_POINTS {
-        return Err(format!("it announces {count} points for picture {number}, {MOST_POINTS} is the limit"));
+        let text = text_in(&head);
+        return Err(format!("it announces {count} points for picture {number}, {MOST_POINTS} is the limit{text}"));
     }
     let mut bytes = vec![0; 24 * count as usize];
     output.read_exact(&mut bytes).map_err(|e| format!("its output ends within {count} points ({e})"))?;
@@ -173,6 +178,23 @@ pub(super) fn read_points(output: &mut impl Read) -> std::result::Result<Option<
         xyz: [float(b, 3), float(b, 4), float(b, 5)],
     };
     Ok(Some((number, bytes.chunks_exact(24).map(point).collect())))
+}
+
+/// A remark if the bytes are letters: a program that prints has lost its place in the format.
+fn text_in(bytes: &[u8]) -> String {
+    let text = bytes.iter().all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace());
+    if text { format!("; these bytes are text: {:?}", String::from_utf8_lossy(bytes)) } else { String::new() }
+}
+
+/// What the number of a picture that was not sent says: letters in its place, or an answer of the wrong length.
+pub(super) fn astray(number: u32, next: u32) -> String {
+    let text = text_in(&number.to_le_bytes());
+    let long = if text.is_empty() && number.wrapping_sub(next) > 1 << 16 {
+        "; the answer before has too many or too few bytes, or a type other than f32"
+    } else {
+        ""
+    };
+    format!("it answered picture {number} where {next} was next{text}{long}")
 }
 
 /// The other side closed the pipe.
@@ -213,6 +235,11 @@ mod tests {
         }
         bytes[4..8].copy_from_slice(&u32::MAX.to_le_bytes());
         assert!(read_points(&mut &bytes[..]).unwrap_err().contains("4294967295 points"));
+        let printed = read_points(&mut &b"found 12 points"[..]).unwrap_err();
+        assert!(printed.contains("these bytes are text: \"found 12\""), "{printed}");
+        assert!(astray(u32::from_le_bytes(*b"4 32"), 1).contains("text: \"4 32\""));
+        assert!(astray(0x3f80_0000, 1).contains("too many or too few bytes"));
+        assert_eq!(astray(7, 1), "it answered picture 7 where 1 was next");
     }
 
     #[test]

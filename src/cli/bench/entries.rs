@@ -4,6 +4,7 @@
 use crate::bench::throughput::{
     self, Compared, Entry, Plan, Results, RowOf, Scenario, SceneKind, Task, compare, verify,
 };
+use crate::cli::terminal::arguments::parse;
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::scan::Where;
@@ -35,7 +36,7 @@ pub struct RunArgs {
     entry: Vec<Entry>,
     /// clean, dim, speckle, thick, slanted, two-stripes, reflections, tenth-lit or dark; may be repeated
     /// [default: all]
-    #[arg(long)]
+    #[arg(long, value_parser = parse::<SceneKind>)]
     scene: Vec<SceneKind>,
     /// Picture size, px; may be repeated
     #[arg(long, value_parser = size, default_value = "640x480")]
@@ -44,7 +45,7 @@ pub struct RunArgs {
     #[arg(long, default_value = "8", value_parser = clap::value_parser!(u8).range(8..=16))]
     bits: Vec<u8>,
     /// single, offline, camera or streams; may be repeated
-    #[arg(long, default_values = ["single", "offline"])]
+    #[arg(long, default_values = ["single", "offline"], value_parser = parse::<Scenario>)]
     scenario: Vec<Scenario>,
     /// Rounds of every program
     #[arg(long, default_value_t = 9)]
@@ -55,6 +56,9 @@ pub struct RunArgs {
     /// Pictures a second of scenario camera [default: 60 million pixels a second]
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
+    /// Longest wait for a program's first line, and for the points of a picture, s
+    #[arg(long, value_name = "S", default_value_t = 120.0)]
+    timeout: f64,
     /// File for the results, JSON
     #[arg(long)]
     out: PathBuf,
@@ -163,6 +167,7 @@ fn drive(args: &RunArgs, console: &Console) -> Result<()> {
         rounds: args.rounds,
         seconds: args.seconds,
         rate_hz: args.rate,
+        timeout_s: args.timeout,
     };
     let turns = plan.entries.len() * (plan.rounds + 1) * plan.tasks.len() * plan.scenarios.len();
     let bar = console.bar("", turns as u64);
@@ -174,7 +179,12 @@ fn drive(args: &RunArgs, console: &Console) -> Result<()> {
     let json = serde_json::to_string_pretty(&results).expect("plain data");
     crate::files::write(&args.out, json.as_bytes())?;
     console.result(&results, &table(&results));
-    Ok(())
+    let failed: Vec<&RowOf> = results.rows.iter().filter(|r| r.failed.is_some()).collect();
+    let Some(first) = failed.first() else { return Ok(()) };
+    let what = format!("{} of {} rows have no result; the first: {}", failed.len(), results.rows.len(), first.entry);
+    Err(Fault::refused(format!("{what}, {}: {}", first.task.name(), first.failed.as_deref().unwrap_or_default()))
+        .cause("the program stopped, or its replies are not in the format of docs/benchmark.md")
+        .next("compare what it reads and writes with that document; the other rows are stored"))
 }
 
 fn number(value: Option<f64>, digits: usize) -> String {
@@ -203,6 +213,9 @@ fn table(results: &Results) -> String {
             number(a.and_then(|a| a.rms_mm), 4),
             per_cent(a.and_then(|a| a.false_share)),
         );
+        if r.task.scene == SceneKind::Dark {
+            line += &a.map_or_else(String::new, |a| format!("  {:.1} false points a picture", a.false_a_picture));
+        }
         if r.scenario == Scenario::Camera {
             line += &format!("  dropped {:.1} % at {:.1}/s", 100.0 * r.dropped(), r.rate_hz.unwrap_or(0.0));
         }
@@ -245,17 +258,27 @@ fn compared(args: &CompareArgs, console: &Console) -> Result<()> {
     let text = std::iter::once(head).chain(rows.iter().map(|r| line(r).trim_end().to_owned())).collect::<Vec<_>>();
     console.result(&rows, &text.join("\n"));
     let Some(limit) = args.at_most else { return Ok(()) };
+    let named = |rows: &[&Compared]| {
+        rows.iter().map(|r| format!("{}, {}", r.task.name(), r.scenario.name())).collect::<Vec<_>>().join("; ")
+    };
     // The lower end of the scatter: a row fails only if nearly all rounds are above the limit.
-    let slower = rows.iter().filter(|r| r.cpu_scatter.is_none_or(|[low, _]| low > limit));
-    let slower: Vec<String> = slower.map(|r| format!("{}, {}", r.task.name(), r.scenario.name())).collect();
-    if rows.is_empty() || !slower.is_empty() {
-        let what = if rows.is_empty() { "no row has both".to_owned() } else { slower.join("; ") };
+    let slower: Vec<&Compared> = rows.iter().filter(|r| r.cpu_scatter.is_some_and(|[low, _]| low > limit)).collect();
+    if !slower.is_empty() {
+        let what = format!("{} takes more than {limit} times the CPU time of {}", args.first, args.second);
+        return Err(Fault::refused(format!("{what}: {}", named(&slower)))
+            .cause("the first program became slower")
+            .next("look at the rows above, and run again on a quiet machine"));
+    }
+    let without: Vec<&Compared> = rows.iter().filter(|r| r.cpu.is_none()).collect();
+    if rows.is_empty() || !without.is_empty() {
+        let what = if rows.is_empty() { "no row has both programs".into() } else { named(&without) };
         return Err(Fault::refused(format!(
-            "{} takes more than {limit} times the CPU time of {}: {what}",
-            args.first, args.second
+            "no ratio of CPU times in {} of {} rows: {what}",
+            without.len(),
+            rows.len()
         ))
-        .cause("the first program became slower, or has no accuracy there")
-        .next("look at the rows above, and run again on a quiet machine"));
+        .cause("one of the programs failed there, has too few or too wrong points, or the system counts no CPU time")
+        .next("the reason stands behind each row"));
     }
     Ok(())
 }
@@ -269,12 +292,16 @@ fn verified(args: &VerifyArgs, console: &Console) -> Result<()> {
     });
     bar.finish_and_clear();
     if found.is_empty() {
-        let text = format!("{}: {} rows, nothing against the rules", args.results.display(), results.rows.len());
+        let text = format!(
+            "{}: {} rows, no breach of the rules that can be checked",
+            args.results.display(),
+            results.rows.len()
+        );
         console.result(&serde_json::json!({"against": found}), &text);
         return Ok(());
     }
     console.result(&serde_json::json!({"against": found}), &found.join("\n"));
-    Err(Fault::refused(format!("{}: {} points are against the rules", args.results.display(), found.len()))
-        .cause("the run was shortened, the machine was busy, or the file was changed")
-        .next("run all scenes with nine rounds on a quiet machine"))
+    Err(Fault::refused(format!("{}: {} breaches of the rules", args.results.display(), found.len()))
+        .cause("each line above names one")
+        .next("run all scenes with nine rounds of one second on a quiet machine"))
 }
