@@ -28,7 +28,7 @@ pub enum Command {
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight bench run --entry 'cpu=sheetlight bench entry --on cpu' --out results.json
-  sheetlight bench run --entry 'cpu=sheetlight bench entry' --entry 'mine=python3 mine.py' --out r.json
+  sheetlight bench run --entry 'a=sheetlight bench entry' --entry 'b=./mine' --out r.json
 Guide: docs/benchmark.md")]
 pub struct RunArgs {
     /// NAME=COMMAND of a program; may be repeated. {scene}, {size}, {bits}, {scenario} in it: open division
