@@ -61,9 +61,11 @@ def test_an_entry_is_scored_at_both_depths(rows, entry):
 
 def test_thinning_by_tiles_gives_the_same_points(rows):
     for bits in (8, 12):
-        of = [rows["clean", bits, entry]["accuracy"] for entry in ("opencv", "tiles")]
+        whole, tiles = (rows["clean", bits, entry]["accuracy"] for entry in ("opencv", "tiles"))
+        numbers = [key for key, value in whole.items() if value is not None]
+        assert len(numbers) >= 6
         # Pictures come in another order, so sums differ in their last digits.
-        assert of[0] == pytest.approx(of[1], rel=1e-9)
+        assert [tiles[key] for key in numbers] == pytest.approx([whole[key] for key in numbers], rel=1e-9)
 
 
 def test_all_entries_saw_the_same_pictures(rows):
