@@ -185,14 +185,24 @@ impl Engine {
         let seen = self.asked.clone().in_noise(noise);
         let host = Host::new(&ChainConfig { ambient: None, measure: None, ..self.config(&seen) }).ok()?;
         let long = LONG_PIECE * self.along_px();
-        let stripe = |image: &Cow<Image>| {
-            let pixels = host.run(0, image, &[0.0; 12]).ok()?.pixels;
-            let across = self.optics.across();
-            let stripe = |pixels: &[u32]| peak::measure(image, pixels, &seen.peak, across);
-            let lines = || brightest(image, long_pieces(&pixels, across.perp(), long));
-            Some((pixels.len() as f32 >= long, of_the_line(&pixels, lines, stripe)?))
+        let across = self.optics.across();
+        let skeleton = |image: &Cow<Image>| host.run(0, image, &[0.0; 12]).ok().map(|found| found.pixels);
+        let skeletons: Vec<Option<Vec<u32>>> = images.par_iter().map(skeleton).collect();
+        let stripe = |(image, pixels): (&Cow<Image>, &Option<Vec<u32>>)| {
+            let pixels = pixels.as_ref()?;
+            let stripe = |pixels: &[u32]| peak::measure(image, pixels, &seen.peak, across, peak::CLEAR);
+            let lines = || brightest(image, long_pieces(pixels, across.perp(), long));
+            Some((pixels.len() as f32 >= long, of_the_line(pixels, lines, stripe)?))
         };
-        let found: Vec<(bool, Stripe)> = images.par_iter().filter_map(stripe).collect();
+        let mut found: Vec<(bool, Stripe)> = images.par_iter().zip(&skeletons).filter_map(stripe).collect();
+        if found.is_empty() {
+            // All pictures are dim. Noise has no long pieces.
+            let dim = |(image, pixels): (&Cow<Image>, &Option<Vec<u32>>)| {
+                let lines = long_pieces(pixels.as_ref()?, across.perp(), long);
+                Some((true, peak::measure(image, &lines, &seen.peak, across, peak::DIM)?))
+            };
+            found = images.par_iter().zip(&skeletons).filter_map(dim).collect();
+        }
         let telling = found.iter().filter(|f| f.0).count();
         let mut found: Vec<Stripe> = found.into_iter().filter(|f| f.0 || telling == 0).map(|f| f.1).collect();
         let middle = found.len() / 2;

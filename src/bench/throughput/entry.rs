@@ -192,7 +192,9 @@ mod tests {
 
     #[test]
     fn every_picture_is_answered_in_order_with_points_on_the_line() {
-        for (scene, bits) in [(SceneKind::Clean, 8), (SceneKind::Slanted, 12), (SceneKind::Reflections, 8)] {
+        let scenes =
+            [(SceneKind::Clean, 8), (SceneKind::Slanted, 12), (SceneKind::Reflections, 8), (SceneKind::Dim, 8)];
+        for (scene, bits) in scenes {
             for scenario in [Scenario::Single, Scenario::Offline] {
                 let task = Task { scene, width: 640, height: 480, bits };
                 let (numbers, a) = answered(&task, scenario);
@@ -202,9 +204,12 @@ mod tests {
                 let [least, rms, wrong] = match scene {
                     SceneKind::Reflections => [0.9, 0.25, 0.12],
                     SceneKind::Slanted => [0.98, 0.15, 0.002],
+                    // Ten times the noise.
+                    SceneKind::Dim => [0.9, 0.3, 0.01],
                     _ => [0.98, 0.05, 0.001],
                 };
-                assert!(a.median_px.unwrap() < 0.015, "{} {a:?}", task.name());
+                let middle = if scene == SceneKind::Dim { 0.15 } else { 0.03 };
+                assert!(a.median_px.unwrap() < middle, "{} {a:?}", task.name());
                 assert!(a.found.unwrap() > least && a.rms_px.unwrap() < rms, "{} {a:?}", task.name());
                 assert!(a.false_share.unwrap() < wrong, "{} {a:?}", task.name());
             }

@@ -21,10 +21,15 @@ const FEWEST: usize = 20;
 /// Pairs of pixels over all windows that are used if grains correlate them.
 const PAIRS: usize = 1_000_000;
 
+/// Least amplitude over noise of the peaks that are used, and the one for stripes so dim that no picture has enough of
+/// them.
+pub const CLEAR: f32 = 10.0;
+pub const DIM: f32 = 4.0;
+
 /// Width, speckle and noise of the stripe in one picture, and the dark pixels' noise as assumed. `None` if there is too
 /// little of the stripe. `across` is the unit image direction of depth. The first estimate of the width is the number
 /// of pixels above half maximum over 2.355. Three rounds of fits follow, each with the results of the round before.
-pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams, across: Vec2) -> Option<Stripe> {
+pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams, across: Vec2, least_snr: f32) -> Option<Stripe> {
     let step = (skeleton.len() / SAMPLES).max(1);
     let sample: Vec<(i32, i32)> =
         skeleton.iter().step_by(step).map(|&q| ((q & 0xffff) as i32, (q >> 16) as i32)).collect();
@@ -39,16 +44,22 @@ pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams, across: Vec2) ->
         let setup = PeakFrame::new(size, 1, &p.with(&stripe), &ChooseParams::default(), across);
         let (width, height) = (setup.width, setup.height);
         stripe = match &image.pixels {
-            Pixels::U8(pixels) => look(View { pixels, width, height }, &sample, &setup, p, stripe)?,
-            Pixels::U16(pixels) => look(View { pixels, width, height }, &sample, &setup, p, stripe)?,
+            Pixels::U8(pixels) => look(View { pixels, width, height }, &sample, &setup, (p, least_snr), stripe)?,
+            Pixels::U16(pixels) => look(View { pixels, width, height }, &sample, &setup, (p, least_snr), stripe)?,
         };
     }
     Some(stripe)
 }
 
 /// One round: fits with sizes and weights from the stripe `before`, and what they give.
-fn look<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame, p: &PeakParams, before: Stripe) -> Option<Stripe> {
-    let fits = fits(image, sample, s);
+fn look<G: Grey>(
+    image: G,
+    sample: &[(i32, i32)],
+    s: &PeakFrame,
+    (p, least_snr): (&PeakParams, f32),
+    before: Stripe,
+) -> Option<Stripe> {
+    let fits = fits(image, sample, s, least_snr);
     if fits.len() < FEWEST {
         return None;
     }
@@ -87,11 +98,11 @@ struct Fit {
 }
 
 /// The usable peaks. Clipped light hides width and noise, and a spot of one pixel is a hot pixel.
-fn fits<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame) -> Vec<Fit> {
+fn fits<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame, least_snr: f32) -> Vec<Fit> {
     let mut pixels = Vec::new();
     let skeleton: Vec<u32> = sample.iter().map(|&(x, y)| x as u32 | (y as u32) << 16).collect();
     let peaks = twin::each(image, &skeleton, 0, s, Method::Gaussian);
-    let usable = |k: &Peak| k.flags == 0 && k.snr > 10.0 && (0.4 * s.s0..2.5 * s.s0).contains(&k.width_px);
+    let usable = |k: &Peak| k.flags == 0 && k.snr > least_snr && (0.4 * s.s0..2.5 * s.s0).contains(&k.width_px);
     let peaks = peaks.into_iter().zip(sample).filter(|(k, _)| usable(k));
     peaks.filter_map(|(peak, &at)| Some(Fit { at, sums: residuals(image, at, &peak, s, &mut pixels)?, peak })).collect()
 }
@@ -294,7 +305,7 @@ mod tests {
             .collect();
         let skeleton: Vec<u32> = (10..width - 10).map(|x| x | 30 << 16).collect();
         let image = Image::from_u8(width, height, pixels);
-        let found = measure(&image, &skeleton, &PeakParams::default(), Vec2::Y).unwrap();
+        let found = measure(&image, &skeleton, &PeakParams::default(), Vec2::Y, CLEAR).unwrap();
         assert!((f64::from(found.width_px) / WIDE - 1.0).abs() < 0.05, "{found:?}");
         assert!((f64::from(found.speckle) / SPECKLE - 1.0).abs() < 0.15, "{found:?}");
     }
@@ -325,7 +336,7 @@ mod tests {
         for (face, print) in [(1200, 1e6), (60, 1e6), (30, 1e6), (1200, 60.0), (60, 90.0)] {
             let (image, skeleton) = falling(face, print);
             let p = PeakParams { width_px: WIDE as f32, ..PeakParams::default() };
-            let found = measure(&image, &skeleton, &p, Vec2::Y).unwrap();
+            let found = measure(&image, &skeleton, &p, Vec2::Y, CLEAR).unwrap();
             let off = |is: f32, of: f64| (f64::from(is) / of - 1.0).abs();
             assert!(off(found.width_px, WIDE) < 0.05, "faces of {face} px, print of {print}: {found:?}");
             assert!(off(found.speckle, SPECKLE) < 0.15, "faces of {face} px, print of {print}: {found:?}");
@@ -362,7 +373,7 @@ mod tests {
         {
             let (image, skeleton) = bent(radius, wide, speckle);
             let p = PeakParams { width_px: wide as f32, ..PeakParams::default() };
-            let found = measure(&image, &skeleton, &p, Vec2::Y).unwrap();
+            let found = measure(&image, &skeleton, &p, Vec2::Y, CLEAR).unwrap();
             let off = |is: f32, of: f64, least: f64| (f64::from(is) - of).abs() / of.max(least);
             let line = format!("{wide} px along {radius} px, speckle {speckle}: {found:?}");
             assert_eq!(found.grain_px, 0.0, "{line}");

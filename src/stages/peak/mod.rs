@@ -20,7 +20,7 @@ mod twin;
 pub use found::{Peak, Reject, SATURATED};
 pub(super) use frame::frame_of;
 pub use frame::{PeakFrame, SHARED, UNIFORM};
-pub use measure::measure;
+pub use measure::{CLEAR, DIM, measure};
 pub use noise::noise;
 pub use params::{Method, PeakParams, Stripe};
 pub use stage::{METHOD, QUADS, STAGE, apart, stage_twin};
