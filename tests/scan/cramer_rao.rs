@@ -4,10 +4,10 @@
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use sheetlight::raster::Image;
-use sheetlight::stages::peak::measure;
 use sheetlight::stages::peak::params::Method;
 use sheetlight::stages::peak::params::PeakParams;
 use sheetlight::stages::peak::peaks;
+use sheetlight::stages::peak::{CLEAR, measure};
 use sheetlight::stages::stripe::{skeleton, thin, threshold};
 use sheetlight::stages::{Thinning, ThresholdParams};
 
@@ -82,7 +82,7 @@ fn errors(stripe: &Stripe, method: Method, along: f32, pictures: u64) -> (f64, f
         let lit = threshold::twin(&image, &ThresholdParams { size, ..Default::default() });
         let list = skeleton::twin(&thin::twin(&lit, Thinning::ZhangSuen));
         let start = PeakParams { method, along, read_noise: 0.7, gain: GAIN as f32, ..PeakParams::default() };
-        let found = measure(&image, &list, &start, ACROSS).expect("a clean stripe is measured");
+        let found = measure(&image, &list, &start, ACROSS, CLEAR).expect("a clean stripe is measured");
         for p in peaks(&image, &list, 0, &start.with(&found), ACROSS) {
             let (u, v) = (f64::from(p.u), f64::from(p.v));
             let d = stripe.across(u, v, phase);
@@ -144,7 +144,7 @@ fn a_sloping_stripe_is_as_good() {
         let lit = threshold::twin(&image, &ThresholdParams { size: 49, ..Default::default() });
         let list = skeleton::twin(&thin::twin(&lit, Thinning::ZhangSuen));
         let start = PeakParams { along: 0.0, gain: GAIN as f32, ..PeakParams::default() };
-        let found = measure(&image, &list, &start, ACROSS).expect("a clean stripe is measured");
+        let found = measure(&image, &list, &start, ACROSS, CLEAR).expect("a clean stripe is measured");
         let d: Vec<f64> = peaks(&image, &list, 0, &start.with(&found), ACROSS)
             .iter()
             .filter(|p| (12.0..108.0).contains(&p.v))
@@ -170,7 +170,7 @@ fn the_stated_standard_deviation_is_the_true_one() {
         let lit = threshold::twin(&image, &ThresholdParams { size, ..Default::default() });
         let list = skeleton::twin(&thin::twin(&lit, Thinning::ZhangSuen));
         let start = PeakParams { gain: GAIN as f32, ..PeakParams::default() };
-        let found = measure(&image, &list, &start, ACROSS).unwrap();
+        let found = measure(&image, &list, &start, ACROSS, CLEAR).unwrap();
         let pulls: Vec<f64> = peaks(&image, &list, 0, &start.with(&found), ACROSS)
             .iter()
             .filter(|p| (40.0..f64::from(WIDTH) - 40.0).contains(&f64::from(p.u)) && p.snr > 10.0)

@@ -8,7 +8,7 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use sheetlight::raster::Image;
 use sheetlight::stages::peak::params::PeakParams;
-use sheetlight::stages::peak::{measure, peaks};
+use sheetlight::stages::peak::{CLEAR, measure, peaks};
 
 const CONTRAST: f64 = 0.15;
 /// Grey levels of 8 bits: the stripe's height, what is dark, read noise; levels a photo-electron.
@@ -97,7 +97,8 @@ fn row(c: &Case) -> (String, Vec<String>) {
     for k in 0..SHOTS {
         let phase = k as f64 / SHOTS as f64;
         let (image, skeleton) = shot(c, phase, &mut rng);
-        let stripe = *found.get_or_insert_with(|| measure(&image, &skeleton, &start, across).expect("a clean stripe"));
+        let stripe =
+            *found.get_or_insert_with(|| measure(&image, &skeleton, &start, across, CLEAR).expect("a clean stripe"));
         for p in peaks(&image, &skeleton, 0, &start.with(&stripe), across) {
             let (x, y) = if c.upright { (p.v, p.u) } else { (p.u, p.v) };
             let d = (f64::from(y) - middle(c, phase, f64::from(x))) / slope(c, f64::from(x)).hypot(1.0);

@@ -6,8 +6,8 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use sheetlight::raster::Image;
-use sheetlight::stages::peak::measure;
 use sheetlight::stages::peak::params::PeakParams;
+use sheetlight::stages::peak::{CLEAR, measure};
 use sheetlight::stages::peak::{Peak, peaks};
 use sheetlight::stages::stripe::choose_params::ChooseParams;
 
@@ -203,7 +203,8 @@ fn row(sigma: f64, angle_deg: f64, light: &Light) -> Row {
         0.3,
         Some(rand_pcg::Pcg64::seed_from_u64(sigma as u64)),
     );
-    let params = start.with(&measure(&flat.image, &flat.skeleton, &start, ACROSS).expect("a clean stripe is measured"));
+    let params =
+        start.with(&measure(&flat.image, &flat.skeleton, &start, ACROSS, CLEAR).expect("a clean stripe is measured"));
     let (mut n, mut sum, mut square, mut pulls, mut width) = (0.0, 0.0, 0.0, 0.0, 0.0);
     let (mut own, mut own_n) = (0.0, 0.0);
     for k in 0..PHASES {
