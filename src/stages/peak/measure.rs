@@ -21,9 +21,9 @@ const FEWEST: usize = 20;
 /// Pairs of pixels over all windows that are used if grains correlate them.
 const PAIRS: usize = 1_000_000;
 
-/// Least amplitude over noise of the peaks that are used, and the one for stripes so dim that no picture has enough of
-/// them.
+/// Least amplitude over noise of the peaks that are used.
 pub const CLEAR: f32 = 10.0;
+/// The same for stripes so dim that no picture has enough peaks above [`CLEAR`].
 pub const DIM: f32 = 4.0;
 
 /// Width, speckle and noise of the stripe in one picture, and the dark pixels' noise as assumed. `None` if there is too
