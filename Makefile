@@ -46,7 +46,7 @@ lint: pages book
 bench: vulkan build
 	$(TARGET)/release/sheetlight bench
 
-# Sheetlight, OpenCV, Steger and a compiled centroid on the same pictures, in turns: ten minutes for each size.
+# Sheetlight, OpenCV, Steger and a compiled centroid on the same pictures, in turns.
 SIZE = 640x480
 bench-entries: vulkan build
 	tools/python-env.sh $(VENV) peers

@@ -3,8 +3,8 @@
 #
 #   examples/archives/slurm.sh MANIFEST STATION OUT [SHARDS [OPTIONS OF BATCH...]]
 #
-# To find a part: ... 64 --recipe /archive/led.toml. MANIFEST, STATION, OUT and the recipe lie on a disk that all nodes see. A task that is lost is queued again. Recordings with
-# results are not scanned again.
+# To find a part: ... 64 --recipe /archive/led.toml. MANIFEST, STATION, OUT and the recipe lie on a disk that all nodes
+# see. A task that is lost is queued again. Recordings with results are not scanned again.
 set -eu
 manifest=$(realpath "$1") station=$(realpath "$2") out=$(realpath -m "$3") shards=${4:-64}
 shift $(($# < 4 ? $# : 4))

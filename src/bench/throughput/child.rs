@@ -199,7 +199,7 @@ impl Running {
         self.fault("it stopped reading pictures")
     }
 
-    /// The next reply; `None` if there is none yet and `wait` is over.
+    /// The next reply; `None` if no reply came within `wait`.
     fn reply(&mut self, wait: Duration) -> Result<Option<Reply>> {
         match self.replies.recv_timeout(wait) {
             Ok(Ok(reply)) => {
@@ -220,7 +220,7 @@ impl Running {
         }
     }
 
-    /// The next reply, which must be to picture `number`; `None` if there is none yet and `wait` is over.
+    /// The next reply, which must be to picture `number`; `None` if no reply came within `wait`.
     pub fn reply_to(&mut self, number: u32, wait: Duration) -> Result<Option<Reply>> {
         match self.reply(wait)? {
             Some(reply) if reply.number != number => Err(self.fault(&astray(reply.number, number))),

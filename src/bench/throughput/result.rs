@@ -143,7 +143,7 @@ pub struct Accuracy {
     pub beyond_three_sigma: Option<f64>,
 }
 
-/// The middle of some numbers; NaN if there are none.
+/// The median; NaN for an empty list.
 pub(super) fn median(numbers: impl IntoIterator<Item = f64>) -> f64 {
     let mut all: Vec<f64> = numbers.into_iter().collect();
     all.sort_by(f64::total_cmp);
@@ -211,7 +211,7 @@ impl Results {
     /// Reads a file that `sheetlight bench run` wrote.
     ///
     /// # Errors
-    /// A file that cannot be read, is none of this format or of another version.
+    /// The file cannot be read, or has another format or another version.
     pub fn read(path: &Path) -> Result<Results> {
         let text = crate::files::read_text(path)?;
         let read = serde_json::from_str::<Results>(&text).map_err(|e| e.to_string());

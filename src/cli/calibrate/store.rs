@@ -71,8 +71,7 @@ pub(in crate::cli) fn stale(station: &Path, console: &Console) {
     match Rig::load(station).and_then(|rig| rig.belong_together()) {
         Ok(()) => {}
         Err(fault) => console.warn(format!(
-            "the camera is a new one for the other calibrations: scans are refused until these are repeated; the \
-             previous camera is kept as camera.previous.json\n{fault}"
+            "the station has another camera than before: scans are refused until these are repeated\n{fault}"
         )),
     }
 }

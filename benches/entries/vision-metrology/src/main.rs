@@ -11,7 +11,7 @@ const HELP: &str = "vision-metrology-entry [--sigma PX] [--gradient SHARE] [--wi
 --sigma     Gaussian before the edges, px [1.2]
 --gradient  least gradient of an edge, share of full scale [0]
 --widths    least and largest distance of the two edges, px [2 10]
---threads   columns are shared among so many threads [all]
+--threads   number of threads, which share the columns [all]
 Defaults are the crate's own.";
 
 struct Options {
