@@ -81,14 +81,16 @@ python:
 	tools/python-env.sh $(VENV) test
 	tools/python-env.sh $(VENV) files
 
-# The figures of docs/python.md: the last one of each notebook, with the installed Python package.
-notebooks:
-	$(VENV)/bin/python python/notebooks/run.py --pictures docs/images
+# The figures of docs/python.md: the last one of each notebook, with this Python package, installed aside.
+SITE := $(abspath $(TARGET))/site
+notebooks: python
+	$(VENV)/bin/python -m pip install -q --no-deps --upgrade --target $(SITE) ./python
+	PYTHONPATH=$(SITE) $(VENV)/bin/python python/notebooks/run.py --pictures docs/images
 
 # All pictures of the documents, from the program as it is: the screen's, the notebooks', the guides'.
 pictures: vulkan python browser build notebooks
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" SHEETLIGHT_WRITE=1 $(CARGO) test --locked --test web
-	python3 tools/pictures.py $(TARGET)/release/sheetlight
+	$(VENV)/bin/python tools/pictures.py $(TARGET)/release/sheetlight
 
 clean:
 	$(CARGO) clean

@@ -1,4 +1,5 @@
-"""In: the built program. Out: the pictures of the guides and of README in docs/images, from a simulated station.
+"""In: the built program. Out: the pictures of the guides, of README and of docs/archives.md in docs/images, from a
+simulated station.
 
 make pictures runs this after the pages' test and the notebooks, which write the other pictures. The report is drawn by
 chromium; where there is none its picture stays as it is, and that is said.
@@ -54,6 +55,10 @@ def main():
         shutil.copyfile(board / "height_picture.png", IMAGES / "guide-map.png")
         shutil.copyfile(overlays[len(overlays) // 2 - 1], IMAGES / "guide-overlay.png")
         report(folder / "cell3" / "calibration" / "camera.html", IMAGES / "guide-report.png")
+        # A year of scans of docs/archives.md.
+        drift = [sys.executable, ROOT / "examples" / "archives" / "drift.py", folder / "year", "--program", program]
+        subprocess.run(drift, check=True)
+        shutil.copyfile(folder / "year" / "drift.png", IMAGES / "archives-drift.png")
 
 
 main()
