@@ -2,6 +2,8 @@
 
 #[path = "docs/commands.rs"]
 mod commands;
+#[path = "docs/gates.rs"]
+mod gates;
 #[path = "docs/help.rs"]
 mod help;
 #[path = "docs/idioms.rs"]

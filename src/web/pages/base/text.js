@@ -1,7 +1,7 @@
 // In: an English text. Out: its translation into the screen's language, from one table; English
 // if the table has none.
 
-import { TABLE } from "./texts.js";
+import { GATES, TABLE } from "./texts.js";
 
 export const LANGUAGES = { en: "English", de: "Deutsch", zh: "中文", ja: "日本語" };
 const COLUMN = { de: 0, zh: 1, ja: 2 };
@@ -21,6 +21,10 @@ export function language() {
 export function t(english) {
   const column = COLUMN[language()];
   return (column === undefined ? undefined : TABLE[english]?.[column]) ?? english;
+}
+/** What the condition of a report is called on the screen; its own name if the table has none. */
+export function gateName(name) {
+  return GATES[name]?.[(COLUMN[language()] ?? -1) + 1] ?? name;
 }
 export function setLanguage(name) {
   localStorage.setItem("language", name);

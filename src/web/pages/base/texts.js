@@ -1052,3 +1052,210 @@ export const TABLE = {
   "σ of a point, median": ["σ eines Punkts, Median", "点 σ（中位数）", "点の σ（中央値）"],
   "σ of the turn": ["σ der Drehung", "转角 σ", "回転 σ"]
 };
+
+// Names of conditions, as reports hold them: English, German, Chinese, Japanese.
+export const GATES = {
+  "score": ["match score", "Trefferwert", "匹配分数", "一致度"],
+  "margin": [
+    "lead over the next match",
+    "Vorsprung vor dem nächsten Treffer",
+    "领先次优匹配",
+    "次点との差"
+  ],
+  "coverage": ["points on the part", "Punkte auf dem Teil", "零件上的点覆盖", "部品上の点の割合"],
+  "agreement": [
+    "points that fit the part",
+    "Punkte, die zum Teil passen",
+    "符合零件的点",
+    "部品に合う点"
+  ],
+  "edges seen": ["edges seen", "gesehene Kanten", "可见边缘", "見えた縁"],
+  "edges crossed": [
+    "edges crossed by the surface",
+    "von der Fläche gekreuzte Kanten",
+    "被表面跨越的边缘",
+    "面が横切る縁"
+  ],
+  "sigma_mm": ["standard deviation, mm", "Standardabweichung, mm", "标准差，mm", "標準偏差, mm"],
+  "sigma_deg": [
+    "standard deviation, degrees",
+    "Standardabweichung, Grad",
+    "标准差，度",
+    "標準偏差, 度"
+  ],
+  "disagreement_mm": [
+    "outline against heights, mm",
+    "Umriss gegen Höhen, mm",
+    "轮廓与高度之差，mm",
+    "輪郭と高さの差, mm"
+  ],
+  "number of looks": [
+    "scans of the part",
+    "Aufnahmen des Teils",
+    "零件扫描次数",
+    "部品のスキャン数"
+  ],
+  "points that tell the turn": [
+    "points that decide the turn",
+    "Punkte, die die Drehung bestimmen",
+    "决定转向的点数",
+    "向きを決める点"
+  ],
+  "turn told": [
+    "share for this turn",
+    "Anteil für diese Drehung",
+    "支持此转向的比例",
+    "この向きの割合"
+  ],
+  "sizes' ratio": [
+    "size against the drawing, sigmas",
+    "Größe gegen Zeichnung, Sigma",
+    "尺寸与图纸之差，σ",
+    "図面との寸法差, σ"
+  ],
+  "range's ratio": [
+    "pointer range against the scan, sigmas",
+    "Zeigerabstand gegen Scan, Sigma",
+    "指示激光距离与扫描之差，σ",
+    "距離とスキャンの差, σ"
+  ],
+  "looks' ratio": [
+    "scans against each other, sigmas",
+    "Scans untereinander, Sigma",
+    "各次扫描之差，σ",
+    "スキャン間の差, σ"
+  ],
+  "looks' misfit": [
+    "misfit of the scans, sigmas",
+    "Widerspruch der Scans, Sigma",
+    "各次扫描的残差，σ",
+    "スキャンの残差, σ"
+  ],
+  "looks' turn_deg": [
+    "turn between the scans, degrees",
+    "Drehung zwischen den Scans, Grad",
+    "扫描间转角，度",
+    "スキャン間の回転, 度"
+  ],
+  "looks' tilt_deg": [
+    "tilt between the scans, degrees",
+    "Neigung zwischen den Scans, Grad",
+    "扫描间倾角，度",
+    "スキャン間の傾き, 度"
+  ],
+  "unseen in plane, mm": [
+    "undetected error in the plane, mm",
+    "unentdeckter Fehler in der Ebene, mm",
+    "平面内未检出误差，mm",
+    "面内の検出できない誤差, mm"
+  ],
+  "unseen height, mm": [
+    "undetected error of the height, mm",
+    "unentdeckter Höhenfehler, mm",
+    "高度未检出误差，mm",
+    "高さの検出できない誤差, mm"
+  ],
+  "unseen turn, deg": [
+    "undetected error of the turn, degrees",
+    "unentdeckter Drehfehler, Grad",
+    "转角未检出误差，度",
+    "回転の検出できない誤差, 度"
+  ],
+  "armed": ["armed", "freigegeben", "已使能", "許可済み"],
+  "automatic mode": ["automatic mode", "Automatikbetrieb", "自动模式", "自動モード"],
+  "motor on": ["motor on", "Motor ein", "电机开启", "モーター入"],
+  "standing still": ["standing still", "steht still", "静止", "停止中"],
+  "no emergency stop": ["no emergency stop", "kein Not-Halt", "无急停", "非常停止なし"],
+  "the arm's place is known": [
+    "the arm's pose is known",
+    "die Lage des Arms ist bekannt",
+    "机械臂位姿已知",
+    "アームの姿勢が既知"
+  ],
+  "scan of this calibration": [
+    "scan made with this calibration",
+    "Scan mit dieser Kalibrierung",
+    "使用此标定的扫描",
+    "この校正によるスキャン"
+  ],
+  "motions": ["motions", "Bewegungen", "运动数", "動作数"],
+  "orthonormality error of the rotation": [
+    "error of the rotation matrix",
+    "Fehler der Drehmatrix",
+    "旋转矩阵误差",
+    "回転行列の誤差"
+  ],
+  "speed, mm/s": ["speed, mm/s", "Geschwindigkeit, mm/s", "速度，mm/s", "速度, mm/s"],
+  "slowest speed, mm/s": [
+    "slowest speed, mm/s",
+    "kleinste Geschwindigkeit, mm/s",
+    "最低速度，mm/s",
+    "最低速度, mm/s"
+  ],
+  "turning rate, degrees/s": [
+    "turning rate, degrees/s",
+    "Drehgeschwindigkeit, Grad/s",
+    "转动速度，度/s",
+    "回転速度, 度/s"
+  ],
+  "outside the workspace, mm": [
+    "outside the workspace, mm",
+    "außerhalb des Arbeitsraums, mm",
+    "超出工作空间，mm",
+    "作業領域の外, mm"
+  ],
+  "starts outside the workspace, mm": [
+    "starts outside the workspace, mm",
+    "beginnt außerhalb des Arbeitsraums, mm",
+    "起点超出工作空间，mm",
+    "始点が作業領域の外, mm"
+  ],
+  "way through a keep-out, mm": [
+    "path through a keep-out, mm",
+    "Weg durch eine Sperrzone, mm",
+    "穿过禁区的路径，mm",
+    "禁止領域を通る経路, mm"
+  ],
+  "step, mm": [
+    "length of a motion, mm",
+    "Länge einer Bewegung, mm",
+    "单次移动长度，mm",
+    "1動作の長さ, mm"
+  ],
+  "turn, degrees": [
+    "turn of a motion, degrees",
+    "Drehung einer Bewegung, Grad",
+    "单次转动角度，度",
+    "1動作の回転, 度"
+  ],
+  "errors on the controller": [
+    "errors on the controller",
+    "Fehler der Steuerung",
+    "控制器错误数",
+    "コントローラーのエラー"
+  ],
+  "number of the tool": [
+    "tool selected on the controller",
+    "gewähltes Werkzeug",
+    "控制器所选工具号",
+    "選択中のツール番号"
+  ],
+  "number of the work frame": [
+    "work frame selected on the controller",
+    "gewähltes Werkstückkoordinatensystem",
+    "控制器所选工件坐标系",
+    "選択中のワーク座標系"
+  ],
+  "tilt to the measured normal, degrees": [
+    "tilt to the measured normal, degrees",
+    "Neigung zur gemessenen Normalen, Grad",
+    "与所测法线的夹角，度",
+    "測定した法線との傾き, 度"
+  ],
+  "age of the scan, s": [
+    "age of the scan, s",
+    "Alter des Scans, s",
+    "扫描时间距今，s",
+    "スキャンの経過時間, s"
+  ]
+};

@@ -4,7 +4,7 @@
 import { post, say, tab } from "../base/api.js";
 import { fill, h, num } from "../base/dom.js";
 import { on, store, tell } from "../base/store.js";
-import { t } from "../base/text.js";
+import { gateName, t } from "../base/text.js";
 import { operate, operating } from "./bar.js";
 import { attempt, fault } from "./problem.js";
 import { figure, panel } from "./parts.js";
@@ -259,7 +259,7 @@ export function gate(g) {
       role: "img",
       "aria-label": t(g.passed ? "kept" : "missed"),
     }),
-    h("span", {}, t(g.name)),
+    h("span", {}, gateName(g.name)),
     h(
       "span",
       { class: "small num" },
