@@ -5,7 +5,7 @@ use super::frame::{ALL_TILES, GAUSSIAN, HAS_ROI};
 use super::listing::{self, HEADER_WORDS};
 use super::peak::across::{centre, direction, turn};
 use super::peak::found::{REASON, Reject, SATURATED};
-use super::peak::{fit, methods, profile, scoring};
+use super::peak::{fit, methods, scoring, windows};
 use super::stripe::{point, skeleton, spacing};
 use super::{grid, support};
 
@@ -42,7 +42,7 @@ pub const NUMBERS: &[(&str, &str, f64)] = &[
     ("peak", "BORDER_STEPS", direction::BORDER_STEPS as f64),
     ("peak", "LEAVES", direction::LEAVES as f64),
     ("peak", "DISUNITED", direction::DISUNITED as f64),
-    ("peak", "STILL", profile::STILL as f64),
+    ("peak", "STILL", windows::STILL as f64),
     ("peak", "BY_NOISE", fit::BY_NOISE as f64),
     ("peak", "UNEVEN", scoring::UNEVEN as f64),
     ("peak", "DARK", scoring::DARK as f64),

@@ -8,8 +8,9 @@ use super::across::direction::direction;
 use super::found::{Peak, SATURATED};
 use super::grey::{Grey, Inner, Place};
 use super::lanes::LANES;
-use super::profile::{Profiles, Seen, centre_at};
+use super::profile::{Profiles, centre_at};
 use super::scoring;
+use super::windows::Seen;
 
 /// Distance in px within which a narrow stripe's own light lies, more of it on the side that its centre is closer to.
 pub(in crate::stages) const BESIDE: i32 = 4;
@@ -44,33 +45,38 @@ pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s:
     (base, if from >= BESIDE { uneven2 } else { 0.0 })
 }
 
-/// Stores the profiles of up to [`LANES`] skeleton pixels side by side.
+/// Stores the profiles of up to [`LANES`] skeleton pixels side by side. Lanes without a place repeat the first one.
 #[inline(always)]
 pub(super) fn look<G: Grey>(places: &[Place<G>], profiles: &mut Profiles, s: &PeakFrame) -> [Seen; LANES] {
-    let mut seen = [Seen::default(); LANES];
     // Farthest pixel that is read for the direction, the level beside the stripe and the profile.
     let beside_stripe = (8.0 * s.s0 + 4.0).max(s.radius + 4.5 * s.s0 + 9.0);
     let reach = (3 * s.lattice_u.max(s.lattice_v)).max(beside_stripe as i32);
     let inner = |x: i32, y: i32| x.min(y) >= reach && x < s.width - reach && y < s.height - reach;
-    for (lane, (place, seen)) in places.iter().zip(&mut seen).enumerate() {
-        let (x, y) = centred(place.image, place.at(), s);
-        *seen = if inner(x, y) {
-            put(Inner(place.image), (x, y), lane, profiles, s)
-        } else {
-            put(place.image, (x, y), lane, profiles, s)
-        };
+    let mut seen = [Seen::default(); LANES];
+    let mut together = true;
+    for (place, seen) in places.iter().zip(&mut seen) {
+        let at = centred(place.image, place.at(), s);
+        let within = inner(at.0, at.1);
+        *seen = if within { beside(Inner(place.image), at, s) } else { beside(place.image, at, s) };
+        together &= within && place.image.is(&places[0].image);
+    }
+    let last = places.len();
+    (last..LANES).for_each(|lane| seen[lane] = seen[0]);
+    let images = std::array::from_fn(|lane| places[if lane < last { lane } else { 0 }].image);
+    if together {
+        profiles.put::<G, true>(images, &seen, s);
+    } else {
+        profiles.put::<G, false>(images, &seen, s);
     }
     seen
 }
 
-/// Stores the profile at a place in a lane.
+/// The direction and the level beside the stripe at a place.
 #[inline(always)]
-fn put<G: Grey>(image: G, (x, y): (i32, i32), lane: usize, profiles: &mut Profiles, s: &PeakFrame) -> Seen {
+fn beside<G: Grey>(image: G, (x, y): (i32, i32), s: &PeakFrame) -> Seen {
     let n = direction(image, x, y, s);
     let (base, uneven2) = background(image, x, y, n.0, n.1, s);
-    let seen = Seen { at: (x, y), n, base, uneven2 };
-    profiles.put(lane, image, &seen, s);
-    seen
+    Seen { at: (x, y), n, base, uneven2 }
 }
 
 /// Peaks of up to [`LANES`] skeleton pixels: their profiles, then all their Gaussian fits at once.

@@ -6,8 +6,10 @@ pub(crate) trait Grey: Copy + Sync {
     fn inside(&self, x: i32, y: i32) -> i32;
     /// The level of a pixel; beyond the border the border pixel repeats.
     fn whole(&self, x: i32, y: i32) -> i32;
-    /// Four pixels in a row, the first in the picture. Pixels beyond the right border have any level of the picture.
-    fn four(&self, x: i32, y: i32) -> [i32; 4];
+    /// Whether both are the same picture.
+    fn is(&self, other: &Self) -> bool;
+    /// The level of a pixel by its number, row by row.
+    fn stored(&self, number: i32) -> i32;
 
     /// As `whole`.
     #[inline(always)]
@@ -49,13 +51,12 @@ impl<T: Copy + Sync + Into<i32>> Grey for View<'_, T> {
         self.inside(x.clamp(0, self.width - 1), y.clamp(0, self.height - 1))
     }
     #[inline(always)]
-    fn four(&self, x: i32, y: i32) -> [i32; 4] {
-        let from = (y * self.width + x) as usize;
-        match self.pixels.get(from..from + 4) {
-            Some(&[a, b, c, d]) => [a, b, c, d].map(Into::into),
-            // At the end of the last row.
-            _ => [0, 1, 2, 3].map(|i| self.whole(x + i, y)),
-        }
+    fn is(&self, other: &Self) -> bool {
+        std::ptr::eq(self.pixels, other.pixels)
+    }
+    #[inline(always)]
+    fn stored(&self, number: i32) -> i32 {
+        self.pixels[number as usize].into()
     }
 }
 
@@ -73,7 +74,11 @@ impl<G: Grey> Grey for Inner<G> {
         self.0.inside(x, y)
     }
     #[inline(always)]
-    fn four(&self, x: i32, y: i32) -> [i32; 4] {
-        self.0.four(x, y)
+    fn is(&self, other: &Self) -> bool {
+        self.0.is(&other.0)
+    }
+    #[inline(always)]
+    fn stored(&self, number: i32) -> i32 {
+        self.0.stored(number)
     }
 }

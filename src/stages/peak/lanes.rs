@@ -51,12 +51,56 @@ impl Lanes {
     }
 }
 
+/// Whole numbers up to this one stand in the lowest bits of their sum with [`bits`]' constant.
+const MOST: f32 = 4_194_304.0;
+
+/// A whole number from -[`MOST`] to `MOST` in the lowest bits, as the exponent of the sum leaves room for no fraction.
+#[inline(always)]
+fn bits(whole: f32) -> u32 {
+    (whole + 3.0 * MOST).to_bits()
+}
+
+/// One whole number for each fit.
+#[derive(Clone, Copy)]
+#[repr(align(32))]
+pub(super) struct Whole(pub [i32; LANES]);
+
+impl Whole {
+    pub const ZERO: Whole = Whole::all(0);
+
+    #[inline(always)]
+    pub const fn all(value: i32) -> Whole {
+        Whole([value; LANES])
+    }
+    /// The largest whole numbers that are not above these numbers, which lie between -[`MOST`] and `MOST`. A cast of
+    /// the language looks for larger ones lane by lane.
+    #[inline(always)]
+    pub fn floor(of: Lanes) -> Whole {
+        Whole(from_fn(|i| bits(of.0[i].floor()).wrapping_sub(bits(0.0)) as i32))
+    }
+    #[inline(always)]
+    pub fn float(self) -> Lanes {
+        Lanes(from_fn(|i| self.0[i] as f32))
+    }
+    #[inline(always)]
+    pub fn with(self, other: Whole, f: impl Fn(i32, i32) -> i32) -> Whole {
+        Whole(from_fn(|i| f(self.0[i], other.0[i])))
+    }
+}
+
 macro_rules! by_lane {
     ($($name:ident $call:ident $sign:tt),*) => {$(
         impl $name for Lanes {
             type Output = Lanes;
             #[inline(always)]
             fn $call(self, other: Lanes) -> Lanes {
+                self.with(other, |a, b| a $sign b)
+            }
+        }
+        impl $name for Whole {
+            type Output = Whole;
+            #[inline(always)]
+            fn $call(self, other: Whole) -> Whole {
                 self.with(other, |a, b| a $sign b)
             }
         }
@@ -92,5 +136,5 @@ pub(super) fn exponential(x: Lanes) -> Lanes {
     let p = Lanes::all(0.240_226_5) + f * (Lanes::all(0.055_504_11) + f * p);
     let p = Lanes::all(1.0) + f * (Lanes::all(0.693_147_2) + f * p);
     // Whole numbers from -120 to 120, which fit into the exponent's bits.
-    p.with(whole, |p, whole| p * f32::from_bits(((whole as i32 + 127) as u32) << 23))
+    p.with(whole, |p, whole| p * f32::from_bits(bits(whole).wrapping_add(127) << 23))
 }

@@ -6,7 +6,8 @@ use super::fit::{background, finish, look};
 use super::found::Peak;
 use super::grey::{Grey, Place};
 use super::lanes::{Lanes, exponential};
-use super::profile::{Profiles, Seen, centre_at, clipped_within, number, share};
+use super::profile::{Profiles, centre_at, clipped_within, number, share};
+use super::windows::Seen;
 
 /// Centre of gravity of the light above the background, within three widths of a first guess.
 #[inline(always)]

@@ -16,6 +16,7 @@ pub(in crate::stages) mod profile;
 pub(in crate::stages) mod scoring;
 mod stage;
 mod twin;
+pub(in crate::stages) mod windows;
 
 pub use found::{Peak, Reject, SATURATED};
 pub(super) use frame::frame_of;

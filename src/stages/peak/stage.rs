@@ -73,8 +73,12 @@ impl Grey for Packed<'_> {
         self.inside(x.clamp(0, self.width - 1), y.clamp(0, self.height - 1))
     }
     #[inline(always)]
-    fn four(&self, x: i32, y: i32) -> [i32; 4] {
-        [0, 1, 2, 3].map(|i| self.whole(x + i, y))
+    fn is(&self, other: &Self) -> bool {
+        std::ptr::eq(self.words, other.words)
+    }
+    #[inline(always)]
+    fn stored(&self, number: i32) -> i32 {
+        self.inside(number % self.width, number / self.width)
     }
 }
 
