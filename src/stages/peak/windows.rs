@@ -6,6 +6,7 @@ use super::PeakFrame;
 use super::grey::Grey;
 use super::lanes::{LANES, Lanes, Whole};
 use std::array::from_fn;
+use std::hint::black_box;
 
 /// Weights along the stripe are whole numbers up to this: sums are then exact.
 pub(super) const WEIGHT: f32 = 127.0;
@@ -226,7 +227,8 @@ impl<G: Grey> Windows<G> {
     fn levels<const INNER: bool>(&self, column: &Column, line: i32) -> Whole {
         let (a, b) = (self.a0 + column.i, (self.b0 + column.shift) + Whole::all(line));
         if INNER {
-            let index = a * self.stride.0 + b * self.stride.1;
+            // Stored at once, or they are computed one by one where they are used.
+            let index = black_box(a * self.stride.0 + b * self.stride.1);
             Whole(index.0.map(|number| self.images[0].stored(number)))
         } else {
             Whole(from_fn(|lane| {
