@@ -71,7 +71,7 @@ vulkan:
 browser:
 	tools/browser.sh
 
-# Cameras that the tests talk to: ffmpeg, aravis' fake one.
+# What the tests talk to: ffmpeg, aravis' fake camera, an MQTT broker.
 cameras:
 	tools/cameras.sh
 

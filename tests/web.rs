@@ -60,7 +60,8 @@ fn python(script: &str, args: &[&str]) -> bool {
     };
     assert!(std::env::var("CI").as_deref() != Ok("true"), "{script} did not run: {why}");
     eprintln!(
-        "\n*** SKIPPED: {script} needs python3, openssl, chromium and chromedriver (tools/browser.sh): {why} ***\n"
+        "\n*** SKIPPED: {script} needs python3, openssl, chromium and chromedriver (tools/browser.sh), and a broker \
+         (tools/cameras.sh): {why} ***\n"
     );
     false
 }
@@ -93,6 +94,12 @@ fn an_operator_goes_from_scan_to_position_through_the_pages() {
 fn other_machines_need_the_password_and_speak_tls() {
     let dir = copy();
     python("tests/web/secured.py", &[program(), dir.path().to_str().unwrap()]);
+}
+
+#[test]
+fn state_and_results_reach_a_broker_which_orders_nothing() {
+    let dir = copy();
+    python("tests/web/broker.py", &[program(), dir.path().to_str().unwrap()]);
 }
 
 /// Whether the long forms run.

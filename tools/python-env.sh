@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # Makes a Python environment with a set of packages (test, files, peers) in a folder: for judges, peers and the tests of
 # the Python package. `files` has what its files, conversions, notebooks and tables need and are read again with: 0.7 GB,
-# half of them OpenCV and Arrow. Ray (0.25 GB) is installed by hand: pip install ray. Sheetlight itself never needs Python; without one the tests that need it say that they were
-# skipped.
+# half of them OpenCV and Arrow. Ray (0.25 GB) is installed by hand: pip install ray. Sheetlight itself never needs
+# Python; without one the tests that need it say that they were skipped.
 set -eu
 folder=$1 set=$2
 case $set in
   test) packages="numpy scipy libigl maturin==1.* mypy prometheus-client pytest" ;;
   files) packages="duckdb laspy[lazrs] matplotlib mcap mcap-ros2-support opencv-contrib-python-headless==4.14.* pyarrow pye57"
-    packages="$packages pymodbus==3.16.* pypcd4 rosbags tifffile trimesh xarray" ;;
+    packages="$packages paho-mqtt==2.* pymodbus==3.16.* pypcd4 rosbags tifffile trimesh xarray" ;;
   peers) packages="numpy scipy numba opencv-contrib-python-headless==4.14.*" ;;
   *) echo "python-env.sh: unknown set '$set': test, files or peers" >&2; exit 2 ;;
 esac

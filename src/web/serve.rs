@@ -4,7 +4,7 @@
 
 use super::api::router;
 use super::camera::Camera;
-use super::event::Hub;
+use super::event::{Broker, Hub, publish};
 use super::guard::{Door, Doorway, Hosts, Peer, Sessions, Tries, door, tls, verify};
 use super::message::Event;
 use super::motion::{Desk, Links, SimulatedRobot};
@@ -63,6 +63,8 @@ pub struct ServeOptions {
     pub secured: Option<Secured>,
     /// Token by which a program may read the figures, and nothing else.
     pub metrics: Option<String>,
+    /// Where state and results are published.
+    pub mqtt: Option<Broker>,
     /// Ends the server when it is set.
     pub stop: Arc<AtomicBool>,
 }
@@ -168,6 +170,9 @@ async fn run(
     let first = screen.clone();
     // Adapters are queried before the first page needs them.
     tokio::task::spawn_blocking(move || first.bar());
+    if let Some(broker) = options.mqtt.clone() {
+        tokio::spawn(publish(broker, screen.hub.clone()));
+    }
     tokio::spawn(bars(screen));
     ready(&format!("{url}/#token={token}"), instead.as_deref())?;
     let stop = options.stop.clone();
@@ -188,13 +193,13 @@ fn hosts(options: &ServeOptions) -> Result<Hosts> {
     Hosts::new(secured.is_some(), secured.map_or(&[][..], |s| &s.names))
 }
 
-/// Sends the bar while there are viewers.
+/// Sends the bar while anybody receives it.
 async fn bars(screen: Arc<Screen>) {
     let mut tick = tokio::time::interval(BAR);
     tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
     loop {
         tick.tick().await;
-        if screen.hub.viewers() > 0 {
+        if screen.hub.is_heard() {
             let shared = screen.clone();
             let _ = tokio::task::spawn_blocking(move || shared.hub.tell(&Event::Bar(shared.bar()))).await;
         }
@@ -296,6 +301,7 @@ mod tests {
             may_move: true,
             secured: None,
             metrics: None,
+            mqtt: None,
             stop: Arc::default(),
         };
         let links = Links {

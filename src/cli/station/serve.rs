@@ -7,7 +7,7 @@ use crate::cli::terminal::interrupt;
 use crate::fault::{Fault, Result};
 use crate::scan::RawFormat;
 use crate::simulate::Set;
-use crate::web::{Mode, Secured, ServeOptions, SimulatedOptions, SimulatedRobot, hashed, random_hex, serve, simulated};
+use crate::web::{Broker, Mode, Secured, ServeOptions, SimulatedOptions, SimulatedRobot, hashed, random_hex, serve, simulated};
 use std::io::{BufRead, IsTerminal};
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::{Path, PathBuf};
@@ -79,6 +79,18 @@ pub struct Serve {
     /// File with a token of 20 characters or more that reads /api/v1/metrics, and nothing else
     #[arg(long, value_name = "FILE")]
     metrics_token_file: Option<PathBuf>,
+    /// MQTT broker to which state, jobs and results are published: mqtt://HOST or mqtts://HOST
+    #[arg(long, value_name = "URI")]
+    mqtt: Option<String>,
+    /// First levels of all topics [default: sheetlight/ and the station folder's name]
+    #[arg(long, value_name = "TOPIC", requires = "mqtt")]
+    mqtt_topic: Option<String>,
+    /// File with the name and the password for the broker, on two lines
+    #[arg(long, value_name = "FILE", requires = "mqtt")]
+    mqtt_login: Option<PathBuf>,
+    /// Certificates, PEM, that sign the broker's certificate [default: the system's]
+    #[arg(long, value_name = "FILE", requires = "mqtt")]
+    mqtt_ca: Option<PathBuf>,
     /// Name by which browsers call this machine; may be repeated
     #[arg(long = "name", requires = "password_file")]
     names: Vec<String>,
@@ -129,6 +141,7 @@ pub fn run(args: &Serve, console: &Console) -> Result<()> {
         may_move: args.allow_motion || cell.is_some(),
         secured,
         metrics: args.metrics_token_file.as_deref().map(metrics_token).transpose()?,
+        mqtt: broker(args)?,
         stop: interrupt::asked_for(),
     };
     serve(&options, cell, &random_hex(), |url, instead| {
@@ -138,6 +151,19 @@ pub fn run(args: &Serve, console: &Console) -> Result<()> {
         console.result(&serde_json::json!({ "url": url }), &said);
         console.finish()
     })
+}
+
+/// Most bytes of a file with certificates: those of a system have 0.3 MB.
+const CA_BYTES: u64 = 4_000_000;
+
+/// The MQTT broker that was named.
+fn broker(args: &Serve) -> Result<Option<Broker>> {
+    let Some(uri) = &args.mqtt else { return Ok(None) };
+    let folder = || args.station.file_name().map_or("station".into(), |n| n.to_string_lossy().into_owned());
+    let topic = args.mqtt_topic.clone().unwrap_or_else(|| format!("sheetlight/{}", folder()));
+    let login = args.mqtt_login.as_deref().map(crate::files::read_text).transpose()?;
+    let authority = args.mqtt_ca.as_deref().map(|file| crate::files::read(file, CA_BYTES)).transpose()?;
+    Broker::new(uri, &topic, login.as_deref(), authority.as_deref()).map(Some)
 }
 
 /// The token in a file. A short one could be guessed.

@@ -4,7 +4,7 @@
 
 use super::Growing;
 use crate::web::message::Event;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tokio::sync::broadcast;
 
@@ -20,11 +20,18 @@ pub struct Hub {
     /// The height map of the running scan.
     pub growing: Growing,
     viewers: AtomicUsize,
+    /// None if no MQTT broker was named; why it is not connected otherwise.
+    broker: Mutex<Option<Result<(), String>>>,
 }
 
 impl Default for Hub {
     fn default() -> Hub {
-        Hub { events: broadcast::channel(WAITING).0, growing: Growing::default(), viewers: AtomicUsize::new(0) }
+        Hub {
+            events: broadcast::channel(WAITING).0,
+            growing: Growing::default(),
+            viewers: AtomicUsize::new(0),
+            broker: Mutex::default(),
+        }
     }
 }
 
@@ -53,6 +60,26 @@ impl Hub {
             return None;
         }
         Some((Seat(self.clone()), self.events.subscribe()))
+    }
+
+    /// Events for the program itself, which takes no viewer's slot.
+    pub fn listen(&self) -> broadcast::Receiver<Arc<str>> {
+        self.events.subscribe()
+    }
+
+    /// Whether anybody receives events.
+    pub fn is_heard(&self) -> bool {
+        self.events.receiver_count() > 0
+    }
+
+    /// Stores whether the MQTT broker is connected.
+    pub fn set_broker(&self, link: Result<(), String>) {
+        *self.broker.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(link);
+    }
+
+    /// Whether the MQTT broker is connected, or why it is not; `None` if no broker was named.
+    pub fn broker(&self) -> Option<Result<(), String>> {
+        self.broker.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone()
     }
 
     /// Number of viewers.

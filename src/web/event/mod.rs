@@ -1,10 +1,15 @@
-//! In: what happens in jobs. Out: events for every viewer. A slow viewer misses some and never delays anything.
+//! In: what happens in jobs. Out: events for every viewer, and for an MQTT broker. Who is slow misses some and never
+//! delays anything.
 //! Frame and unit: bytes, rows of a growing height map (mm).
 
+mod broker;
 mod growing;
 mod hub;
+mod mqtt;
 mod socket;
 
+pub use broker::Broker;
 pub use growing::Growing;
 pub use hub::Hub;
+pub use mqtt::publish;
 pub use socket::stream;
