@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-const CALLS: [&str; 5] = ["Gate::least(\"", "Gate::most(\"", " least(\"", " most(\"", "must(\""];
+const CALLS: [&str; 3] = ["least(\"", "most(\"", "must(\""];
 /// Names that are not written in a call.
 const OTHERS: [&str; 3] = ["number of looks", "points that tell the turn", "turn told"];
 

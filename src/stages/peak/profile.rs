@@ -139,8 +139,8 @@ impl Profiles {
         }
     }
 
-    /// Stores the profiles of places side by side. With `INNER`, all of them lie in one picture, with what is read beside
-    /// them.
+    /// Stores the profiles of places side by side. With `INNER`, all of them lie in one picture, and so do all pixels
+    /// that are read for them.
     #[inline(always)]
     pub fn put<G: Grey, const INNER: bool>(&mut self, images: [G; LANES], seen: &[Seen; LANES], s: &PeakFrame) {
         let windows = Windows::new(images, seen, s);

@@ -73,7 +73,7 @@ impl Broker {
         if authority.is_some() && !encrypted {
             return Err(refused("a certificate authority is given, and mqtt:// is not encrypted"));
         }
-        let login = login.map(|text| two_lines(text)).transpose()?;
+        let login = login.map(two_lines).transpose()?;
         let here = host == "localhost" || host.parse::<std::net::IpAddr>().is_ok_and(|ip| ip.is_loopback());
         if login.is_some() && !encrypted && !here {
             return Err(refused(format!("{uri}: the password would cross the network in clear"))
