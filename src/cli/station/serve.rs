@@ -7,7 +7,9 @@ use crate::cli::terminal::interrupt;
 use crate::fault::{Fault, Result};
 use crate::scan::RawFormat;
 use crate::simulate::Set;
-use crate::web::{Broker, Mode, Secured, ServeOptions, SimulatedOptions, SimulatedRobot, hashed, random_hex, serve, simulated};
+use crate::web::{
+    Broker, Mode, Secured, ServeOptions, SimulatedOptions, SimulatedRobot, hashed, random_hex, serve, simulated,
+};
 use std::io::{BufRead, IsTerminal};
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::{Path, PathBuf};

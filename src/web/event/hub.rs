@@ -4,8 +4,8 @@
 
 use super::Growing;
 use crate::web::message::Event;
-use std::sync::{Arc, Mutex};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 use tokio::sync::broadcast;
 
 /// Events queued for slow viewers; all viewers share the queue, so memory does not grow with their number.
