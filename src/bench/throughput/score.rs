@@ -10,8 +10,10 @@ use crate::geometry::Vec3;
 pub(super) const FALSE_PX: f64 = 3.0;
 /// Smaller standard deviations are no statement, px; nor are those beyond the limit of a false point.
 const MOST_SURE: f64 = 1e-4;
-/// A column of a line is found if a point lies this near, px.
+/// A column of a line is found if a point lies this near across the line, px.
 const FOUND_PX: f64 = 1.0;
+/// And this near along it: points of one a pixel are up to a pixel and a half apart on a slanted line.
+const BESIDE_PX: f64 = 0.75;
 
 /// Sums over the pictures of a task.
 #[derive(Default)]
@@ -63,13 +65,17 @@ impl Score {
                 continue;
             };
             // A column counts once, however many points it has: copies of a good one change nothing.
-            let last = columns[i].len() - 1;
-            let column = &mut columns[i][((at - lines[i].from).round().max(0.0) as usize).min(last)];
+            let along = at - lines[i].from;
+            let last = columns[i].len() as f64 - 1.0;
+            if off.abs() <= FOUND_PX {
+                let [from, to] = [along - BESIDE_PX, along + BESIDE_PX].map(|a| a.clamp(0.0, last));
+                columns[i][from.ceil() as usize..=to.floor() as usize].iter_mut().for_each(|c| c.found = true);
+            }
+            let column = &mut columns[i][along.round().clamp(0.0, last) as usize];
             let xyz = Vec3::from(p.xyz.map(f64::from));
             // A point that is no number counts as a metre away.
             let mm = task.point(at, lines[i].row(at)).map_or(0.0, |truth| (xyz - truth).norm());
             column.points += 1.0;
-            column.found |= off.abs() <= FOUND_PX;
             column.px2 += off * off;
             column.mm2 += if mm.is_finite() { (mm * mm).min(1e6) } else { 1e6 };
             if (MOST_SURE..=FALSE_PX).contains(&f64::from(p.sigma_px)) {
@@ -161,6 +167,16 @@ mod tests {
         some.iter_mut().for_each(|p| p.v += 5.0);
         let away = scored(&task, &some);
         assert_eq!((away.found, away.false_share, away.rms_px), (Some(0.0), Some(1.0), None));
+        // Between the points of one a pixel of a slanted line no column is missed, between those of every third one is.
+        let slanted = Task { scene: SceneKind::Slanted, ..task };
+        let mut apart = points(&slanted, 0, 0.0);
+        apart.iter_mut().enumerate().for_each(|(i, p)| {
+            let by = if i % 2 == 0 { 0.25 } else { -0.25 };
+            (p.u, p.v) = (p.u + by, p.v + by * slanted.lines(0)[0].slope(f64::from(p.u)) as f32);
+        });
+        assert_eq!(scored(&slanted, &apart).found, Some(1.0));
+        let thin: Vec<Found> = points(&slanted, 0, 0.0).into_iter().step_by(3).collect();
+        assert!((scored(&slanted, &thin).found.unwrap() - 1.0 / 3.0).abs() < 0.01);
         // Points that are off by 1.5 px are no longer "found", and not yet false.
         let near = scored(&task, &points(&task, 0, 1.5));
         assert_eq!((near.found, near.false_share), (Some(0.0), Some(0.0)));
