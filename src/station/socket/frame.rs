@@ -51,7 +51,11 @@ pub fn answer(Frame(frame): &Frame, registers: &mut Registers, from: IpAddr) -> 
 
 /// The answer without its header, or an exception's code.
 fn executed(pdu: &[u8], registers: &mut Registers, from: IpAddr) -> Result<(Vec<u8>, Option<Asked>), u8> {
-    let refused = |r: Refused| if r == Refused::Address { ADDRESS } else { BUSY };
+    let refused = |r: Refused| match r {
+        Refused::Address => ADDRESS,
+        Refused::Busy => BUSY,
+        Refused::Number => VALUE,
+    };
     let long = |bytes: usize| if pdu.len() == bytes { Ok(()) } else { Err(VALUE) };
     // The registers that a request writes. Their count stands at `at`, their bytes' count before `data`.
     let counted = |at: usize, most: u16, data: usize| {
@@ -120,7 +124,7 @@ mod tests {
     }
 
     fn registers() -> Registers {
-        Registers::new(Convention::Denso, Duration::from_secs(10)).unwrap()
+        Registers::new(Convention::Denso, Duration::from_secs(10), 0).unwrap()
     }
 
     #[test]

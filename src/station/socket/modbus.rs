@@ -8,6 +8,8 @@ use super::serve::{LOOK, Patience};
 use super::session::Session;
 use super::words::{self, Request};
 use crate::fault::{Fault, Result};
+use std::collections::hash_map::RandomState;
+use std::hash::{BuildHasher, Hasher};
 use std::io::{ErrorKind, Read, Write};
 use std::net::{IpAddr, TcpListener, TcpStream};
 use std::sync::Mutex;
@@ -38,7 +40,7 @@ pub fn serve_modbus(
     told: &mut dyn FnMut(&str),
 ) -> Result<()> {
     let shared = Shared {
-        registers: Mutex::new(Registers::new(session.notation(), patience.idle)?),
+        registers: Mutex::new(Registers::new(session.notation(), patience.idle, by_chance())?),
         patience,
         open: AtomicUsize::new(0),
         over: AtomicBool::new(false),
@@ -71,6 +73,11 @@ pub fn serve_modbus(
         shared.over.store(true, SeqCst);
     });
     Ok(())
+}
+
+/// A number that nobody can know.
+fn by_chance() -> u16 {
+    RandomState::new().build_hasher().finish() as u16
 }
 
 /// Executes requests until `stop`, while other threads read the registers.

@@ -50,6 +50,8 @@ pub enum Refused {
     Address,
     /// A request is being executed, or another PLC makes the requests.
     Busy,
+    /// The request's number does not follow that of the last answered one.
+    Number,
 }
 
 /// A request that registers made.
@@ -77,10 +79,13 @@ pub struct Registers {
 
 impl Registers {
     /// Registers of poses in `notation`. A PLC that makes requests is the only one until it is silent for `patience`.
+    /// `answered` stands as the number of the last answered request, though there was none yet. A PLC writes its last
+    /// request in every cycle, also after this program started again: a number that it cannot know keeps that from
+    /// being executed a second time.
     ///
     /// # Errors
     /// The notation is not of six numbers in mm and degrees.
-    pub fn new(notation: Convention, patience: Duration) -> Result<Registers> {
+    pub fn new(notation: Convention, patience: Duration, answered: u16) -> Result<Registers> {
         let unit = |label: &&str| label.ends_with(" mm") || label.ends_with(" deg");
         let labels = notation.labels();
         if labels.len() != POSE / 2 || !labels.iter().all(unit) {
@@ -90,7 +95,7 @@ impl Registers {
                 .next("give --notation denso, kuka, fanuc or yaskawa, or serve text lines"));
         }
         let mut input = [0; input::COUNT];
-        input[input::MAP] = MAP;
+        (input[input::MAP], input[input::ANSWERED]) = (MAP, answered);
         Ok(Registers {
             notation,
             holding: [0; holding::COUNT],
@@ -120,11 +125,11 @@ impl Registers {
         part(&self.input, address, count)
     }
 
-    /// Writes registers; all or none. A new number in the first of them makes a request. The same number again makes
-    /// none: PLCs write the same registers in every cycle.
+    /// Writes registers; all or none. The number after that of the last answered request makes a request. The same
+    /// number again makes none: PLCs write the same registers in every cycle.
     ///
     /// # Errors
-    /// There are no such registers, or a new request comes too early.
+    /// There are no such registers, a new request comes too early, or its number is not the next one.
     pub fn write(
         &mut self,
         address: u16,
@@ -139,9 +144,13 @@ impl Registers {
         }
         let owner = self.asks.filter(|(_, last)| now.duration_since(*last) < self.patience).map(|(who, _)| who);
         let number = if begin == holding::NUMBER { values[0] } else { self.holding[holding::NUMBER] };
-        let new = number != self.holding[holding::NUMBER];
+        let answered = self.input[input::ANSWERED];
+        let new = ![0, answered, self.holding[holding::NUMBER]].contains(&number);
         if owner.is_some_and(|who| who != from) || (new && self.input[input::BUSY] == 1) {
             return Err(Refused::Busy);
+        }
+        if new && number != next(answered) {
+            return Err(Refused::Number);
         }
         if self.asks.is_some_and(|(who, _)| who != from) {
             // What the other PLC wrote is no part of this one's request.
@@ -149,7 +158,7 @@ impl Registers {
         }
         self.asks = Some((from, now));
         self.holding[begin..end].copy_from_slice(values);
-        if !new || number == 0 {
+        if !new {
             return Ok(None);
         }
         self.input[input::BUSY] = 1;
@@ -236,6 +245,11 @@ impl Registers {
     }
 }
 
+/// The number after this one; 0 is none.
+fn next(number: u16) -> u16 {
+    number.checked_add(1).unwrap_or(1)
+}
+
 fn part(of: &[u16], address: u16, count: u16) -> std::result::Result<Vec<u16>, Refused> {
     let begin = usize::from(address);
     let found = of.get(begin..begin + usize::from(count)).filter(|found| !found.is_empty());
@@ -250,8 +264,28 @@ mod tests {
     const PLC: IpAddr = IpAddr::V4(std::net::Ipv4Addr::new(10, 0, 0, 2));
     const OTHER: IpAddr = IpAddr::V4(std::net::Ipv4Addr::new(10, 0, 0, 3));
 
+    fn after(answered: u16) -> Registers {
+        Registers::new(Convention::Denso, Duration::from_secs(10), answered).unwrap()
+    }
+
     fn registers() -> Registers {
-        Registers::new(Convention::Denso, Duration::from_secs(10)).unwrap()
+        after(0)
+    }
+
+    #[test]
+    fn only_the_next_number_makes_a_request() {
+        let (mut r, now) = (after(700), Instant::now());
+        // What a PLC still writes from before a start of this program.
+        for old in [1, 5, 699, 702, 65535] {
+            assert_eq!(r.write(0, &[old, 1, 0, 0], PLC, now), Err(Refused::Number), "{old}");
+            assert_eq!(r.written(0, 4), Ok(vec![0; 4]), "a refused write changes nothing");
+        }
+        assert_eq!(r.write(0, &[700, 1], PLC, now), Ok(None));
+        assert!(r.write(0, &[701, 1], PLC, now).unwrap().is_some());
+        r.answer(701, &Ok(Reply::Shots(0)), &Reply::Scanning(0));
+        let mut last = after(65535);
+        assert_eq!(last.write(0, &[0], PLC, now), Ok(None));
+        assert!(last.write(0, &[1, 1], PLC, now).unwrap().is_some());
     }
 
     #[test]
@@ -277,7 +311,7 @@ mod tests {
 
     #[test]
     fn the_same_registers_again_are_no_request_and_a_new_one_waits() {
-        let (mut r, now) = (registers(), Instant::now());
+        let (mut r, now) = (after(4), Instant::now());
         assert!(r.write(0, &[5, 1, 0, 0], PLC, now).unwrap().is_some());
         assert_eq!(r.write(0, &[5, 1, 0, 0], PLC, now), Ok(None), "a cycle");
         assert_eq!(r.write(0, &[6, 1, 0, 0], PLC, now), Err(Refused::Busy));
@@ -312,7 +346,7 @@ mod tests {
         let (mut r, now) = (registers(), Instant::now());
         r.answer(1, &Ok(Reply::Pose(vec![1.0; 6])), &Reply::Idle);
         let wrong = |r: &mut Registers, values: &[u16]| {
-            r.input[input::BUSY] = 0;
+            (r.input[input::BUSY], r.input[input::ANSWERED]) = (0, values[0] - 1);
             r.write(0, values, PLC, now).unwrap().unwrap().request.unwrap_err()
         };
         assert_eq!(wrong(&mut r, &[1, 9]).words, "register 1 is 9; 1 SCAN, 2 POSE, 3 FIND and 4 GIVE are requests");
@@ -334,7 +368,7 @@ mod tests {
     #[test]
     fn poses_in_other_units_are_refused() {
         for other in [Convention::Ur, Convention::Abb, Convention::Matrix] {
-            let said = Registers::new(other, Duration::ZERO).err().unwrap();
+            let said = Registers::new(other, Duration::ZERO, 0).err().unwrap();
             assert!(said.what.starts_with("Modbus has no registers for poses in the notation"), "{said}");
         }
     }
@@ -345,7 +379,11 @@ mod tests {
             writes in prop::collection::vec((0..40u16, prop::collection::vec(any::<u16>(), 0..40)), 1..20),
         ) {
             let (mut r, now) = (registers(), Instant::now());
-            for (address, values) in writes {
+            for (address, mut values) in writes {
+                // Every other number follows; by chance hardly any would.
+                if let (0, Some(first)) = (address, values.first_mut()) && *first % 2 == 0 {
+                    *first = next(r.read(3, 1).unwrap()[0]);
+                }
                 if let Ok(Some(asked)) = r.write(address, &values, PLC, now) {
                     prop_assert_eq!(r.read(2, 1).unwrap(), vec![1]);
                     let said = asked.request.map(|_| Reply::Pose(vec![f64::from(asked.number) * 1e5; 6]));
