@@ -103,6 +103,8 @@ def published(mqtt, port):
     assert result == job and result["outcome"]["lines"], (result, job)
     states = [json.loads(text)["state"] for text in reader.all("job/check")]
     assert states[-1] == "done" and len(states) == len(set(states)) >= 2, states
+    (link,) = s.json("GET", "/settings")["connections"]
+    assert link["door"] == "mqtt" and link["problem"] is None and link["lost"] == 0 and link["sent"] >= len(states), link
     # Who subscribes later gets what is kept, and no old changes.
     late = Subscriber(mqtt, port)
     until("what is kept", lambda: late.last("state") == "online" and late.last("result/check") and late.last("status"))

@@ -47,7 +47,7 @@ fn text(screen: &Screen) -> String {
     m.one(("sheetlight_job_running", "gauge"), "1 while a job runs.", Some(u8::from(bar.running.is_some())));
     m.one(("sheetlight_alarms", "gauge"), "Alarms that the bar shows.", Some(bar.alarms.len()));
 
-    let broker = screen.hub.broker().map(|link| u8::from(link.is_ok()));
+    let broker = screen.hub.broker().map(|link| u8::from(link.problem.is_none()));
     m.one(("sheetlight_mqtt_connected", "gauge"), "1 while the MQTT broker is connected.", broker);
     let linked = u8::from(bar.robot != RobotState::NoLink);
     m.one(("sheetlight_robot_linked", "gauge"), "1 while the robot answers.", Some(linked));

@@ -3,9 +3,9 @@
 //! Frame and unit: none.
 
 use super::Growing;
-use crate::web::message::Event;
+use crate::web::message::{Connection, Event};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 use tokio::sync::broadcast;
 
 /// Events queued for slow viewers; all viewers share the queue, so memory does not grow with their number.
@@ -20,8 +20,8 @@ pub struct Hub {
     /// The height map of the running scan.
     pub growing: Growing,
     viewers: AtomicUsize,
-    /// None if no MQTT broker was named; why it is not connected otherwise.
-    broker: Mutex<Option<Result<(), String>>>,
+    /// The link to an MQTT broker; None if no broker was named.
+    broker: Mutex<Option<Connection>>,
 }
 
 impl Default for Hub {
@@ -72,14 +72,15 @@ impl Hub {
         self.events.receiver_count() > 0
     }
 
-    /// Stores whether the MQTT broker is connected.
-    pub fn set_broker(&self, link: Result<(), String>) {
-        *self.broker.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(link);
+    /// Changes what is known of the link to the MQTT broker.
+    pub fn link(&self, change: impl FnOnce(&mut Connection)) {
+        let mut broker = self.broker.lock().unwrap_or_else(PoisonError::into_inner);
+        change(broker.get_or_insert_with(|| Connection { door: "mqtt".into(), ..Connection::default() }));
     }
 
-    /// Whether the MQTT broker is connected, or why it is not; `None` if no broker was named.
-    pub fn broker(&self) -> Option<Result<(), String>> {
-        self.broker.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone()
+    /// The link to the MQTT broker; `None` if no broker was named.
+    pub fn broker(&self) -> Option<Connection> {
+        self.broker.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Number of viewers.

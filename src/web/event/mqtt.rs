@@ -19,8 +19,11 @@ const AGAIN: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(30)];
 pub async fn publish(broker: Broker, hub: Arc<Hub>) {
     let events = hub.listen();
     let (client, connection) = AsyncClient::new(broker.options(), WAITING);
-    hub.set_broker(Err(format!("{} was not reached yet", broker.name())));
-    tokio::join!(hold(&broker, &hub, &client, connection), pass_on(&broker, &client, events));
+    hub.link(|link| {
+        link.address = broker.name();
+        link.problem = Some(format!("{} was not reached yet", broker.name()));
+    });
+    tokio::join!(hold(&broker, &hub, &client, connection), pass_on(&broker, &hub, &client, events));
 }
 
 /// Holds the connection, and makes it again.
@@ -29,13 +32,13 @@ async fn hold(broker: &Broker, hub: &Hub, client: &AsyncClient, mut connection: 
     loop {
         match connection.poll().await {
             Ok(Event::Incoming(Packet::ConnAck(_))) => {
-                hub.set_broker(Ok(()));
+                hub.link(|link| link.problem = None);
                 wait = AGAIN[0];
                 let _ = client.try_publish(broker.topic("state"), QoS::AtLeastOnce, true, "online");
             }
             Ok(_) => {}
             Err(e) => {
-                hub.set_broker(Err(format!("{} does not answer: {e}", broker.name())));
+                hub.link(|link| link.problem = Some(format!("{} does not answer: {e}", broker.name())));
                 tokio::time::sleep(wait).await;
                 wait = (2 * wait).min(AGAIN[1]);
             }
@@ -44,14 +47,15 @@ async fn hold(broker: &Broker, hub: &Hub, client: &AsyncClient, mut connection: 
 }
 
 /// Sends what is of use to others.
-async fn pass_on(broker: &Broker, client: &AsyncClient, mut events: Receiver<Arc<str>>) {
+async fn pass_on(broker: &Broker, hub: &Hub, client: &AsyncClient, mut events: Receiver<Arc<str>>) {
     let mut states = States::default();
     loop {
         match events.recv().await {
             Ok(text) => {
                 for message in states.messages(&serde_json::from_str(&text).expect("the hub's own text")) {
                     let (topic, qos) = (broker.topic(&message.topic), QoS::AtLeastOnce);
-                    let _ = client.try_publish(topic, qos, message.kept, message.text);
+                    let handed = client.try_publish(topic, qos, message.kept, message.text).is_ok();
+                    hub.link(|link| if handed { link.sent += 1 } else { link.lost += 1 });
                 }
             }
             Err(RecvError::Lagged(_)) => {}

@@ -23,8 +23,27 @@ pub struct SettingsState {
     pub recordings: String,
     /// Other machines may open the screen, with the password.
     pub secured: bool,
+    /// Links to other programs that were named when the program was started.
+    pub connections: Vec<Connection>,
     /// Newest first.
     pub backups: Vec<BackupInfo>,
+}
+
+/// A link to another program.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, TS)]
+pub struct Connection {
+    /// mqtt.
+    pub door: String,
+    /// Address of the other program.
+    pub address: String,
+    /// Why it is not connected; null if it is.
+    pub problem: Option<String>,
+    /// Messages that were handed over since the start.
+    #[ts(type = "number")]
+    pub sent: u64,
+    /// Messages that were not, because too many waited.
+    #[ts(type = "number")]
+    pub lost: u64,
 }
 
 /// A backup in the station's folder `backups`.

@@ -1,6 +1,16 @@
 // The only table of texts: English, then German, Chinese, Japanese.
 
 export const TABLE = {
+  "None. --mqtt URI publishes state, jobs and results to a broker.": [
+    "Keine. --mqtt URI veröffentlicht Zustand, Aufträge und Ergebnisse.",
+    "无。--mqtt URI 将状态、任务和结果发布到代理。",
+    "なし。--mqtt URI で状態・ジョブ・結果をブローカーに発行します。"
+  ],
+  "connected": ["verbunden", "已连接", "接続中"],
+  "Not sent": ["Nicht gesendet", "未发送", "未送信"],
+  "Messages sent": ["Gesendete Meldungen", "已发送消息", "送信数"],
+  "Connections": ["Verbindungen", "连接", "接続"],
+  "Address": ["Adresse", "地址", "アドレス"],
   "1280×960 has four times the pixels of 640×480. Other machines were measured earlier, with one clean stripe.":
     [
       "1280×960 hat viermal so viele Pixel wie 640×480. Andere Maschinen: früher mit einem sauberen Streifen gemessen.",

@@ -100,6 +100,7 @@ export async function show(place) {
             ),
           ),
         ),
+        panel(t("Connections"), connections(now.connections)),
         panel(t("Backup"), kept),
         panel(
           t("Folders"),
@@ -145,6 +146,21 @@ export async function show(place) {
   );
   draw();
   return tryOutputs(outputs);
+}
+
+/** Other programs that are sent to, as they were when the page was opened. */
+function connections(links) {
+  if (links.length === 0) {
+    return h(
+      "p",
+      { class: "small quiet" },
+      t("None. --mqtt URI publishes state, jobs and results to a broker."),
+    );
+  }
+  return table(
+    [t("Address"), t("State"), t("Messages sent"), t("Not sent")],
+    links.map((l) => [l.address, l.problem ?? t("connected"), String(l.sent), String(l.lost)]),
+  );
 }
 
 /** Backups, made by hand and before each change; each can be downloaded or restored. */
