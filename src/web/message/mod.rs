@@ -36,7 +36,7 @@ pub use place::{
     BoardView, CalibrationState, FrameInfo, PictureRef, RecipeAsk, RecipeText, RecordingInfo, StationInfo, SupportAsk,
     ViewRef,
 };
-pub use settings::{BackupInfo, OutputAsk, SettingsAsk, SettingsState};
+pub use settings::{BackupInfo, Connection, OutputAsk, SettingsAsk, SettingsState};
 pub use surface::{
     Distance, Fit, Ghost, MapHead, Measure, MeasureAnswer, Outlines, PlaneAsk, PointsAsk, Section, SectionAsk,
     SectionPoint,

@@ -106,6 +106,7 @@ fn of_station() -> Vec<String> {
         FrameInfo::decl(),
         StationInfo::decl(),
         BackupInfo::decl(),
+        Connection::decl(),
         SettingsState::decl(),
         SettingsAsk::decl(),
         OutputAsk::decl(),
