@@ -125,6 +125,7 @@ const HOMES: &[(&str, &str)] = &[
     ("pollster", "gpu"),
     ("rpassword", "cli"),
     ("rs_opw_kinematics", "cell"),
+    ("rumqttc", "web"),
     ("rust_embed", "web"),
     ("saphyr_parser", "station"),
     ("signal_hook", "cli"),

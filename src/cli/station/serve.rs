@@ -27,13 +27,13 @@ use std::path::{Path, PathBuf};
       --password-file pw --tls-cert cert.pem --tls-key key.pem
 Guide: docs/operator.md")]
 pub struct Serve {
-    /// Station folder; with --simulate the folder for a simulated station
+    /// Station folder; a new one with --simulate
     #[arg(long)]
     station: PathBuf,
-    /// Folder of the recordings [default: the folder that holds the station]
+    /// Folder of recordings [default: the folder with the station]
     #[arg(long)]
     recordings: Option<PathBuf>,
-    /// Start a simulated cell with camera and robot, and make a station for it
+    /// Start a simulated cell with camera and robot, and its station
     #[arg(long, conflicts_with = "recordings")]
     simulate: bool,
     /// Component in the simulated gripper: led, osc, flash or dimm
@@ -57,7 +57,7 @@ pub struct Serve {
     /// Raw frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<RawFormat>, requires = "camera")]
     raw: Option<RawFormat>,
-    /// Robot, e.g. bcap://10.0.0.2; it moves only with --allow-motion
+    /// Robot, e.g. bcap://10.0.0.2; moves only with --allow-motion
     #[arg(long, conflicts_with = "simulate")]
     robot: Option<String>,
     /// Allow robot motion; each motion is shown first and runs only while a button is held
@@ -69,28 +69,28 @@ pub struct Serve {
     /// Address to listen on; any but 127.0.0.1 needs a password and TLS
     #[arg(long, default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), requires_ifs = [("0.0.0.0", "password_file")])]
     listen: IpAddr,
-    /// File with the password's hash, from sheetlight station password
-    #[arg(long, requires_all = ["tls_cert", "tls_key"])]
+    /// Password's hash, from sheetlight station password
+    #[arg(long, value_name = "FILE", requires_all = ["tls_cert", "tls_key"])]
     password_file: Option<PathBuf>,
     /// TLS certificate chain, PEM
-    #[arg(long, requires_all = ["password_file", "tls_key"])]
+    #[arg(long, value_name = "FILE", requires_all = ["password_file", "tls_key"])]
     tls_cert: Option<PathBuf>,
     /// TLS private key, PEM
-    #[arg(long, requires_all = ["password_file", "tls_cert"])]
+    #[arg(long, value_name = "FILE", requires_all = ["password_file", "tls_cert"])]
     tls_key: Option<PathBuf>,
-    /// File with a token of 20 characters or more that reads /api/v1/metrics, and nothing else
+    /// Token, 20 characters or more, that only reads /api/v1/metrics
     #[arg(long, value_name = "FILE")]
     metrics_token_file: Option<PathBuf>,
-    /// MQTT broker to which state, jobs and results are published: mqtt://HOST or mqtts://HOST
+    /// MQTT broker for state and results: mqtt://HOST or mqtts://HOST
     #[arg(long, value_name = "URI")]
     mqtt: Option<String>,
-    /// First levels of all topics [default: sheetlight/ and the station folder's name]
+    /// First topic levels [default: sheetlight/ and the folder's name]
     #[arg(long, value_name = "TOPIC", requires = "mqtt")]
     mqtt_topic: Option<String>,
-    /// File with the name and the password for the broker, on two lines
+    /// Name and password for the broker, on two lines
     #[arg(long, value_name = "FILE", requires = "mqtt")]
     mqtt_login: Option<PathBuf>,
-    /// Certificates, PEM, that sign the broker's certificate [default: the system's]
+    /// PEM certificates that sign the broker's [default: the system's]
     #[arg(long, value_name = "FILE", requires = "mqtt")]
     mqtt_ca: Option<PathBuf>,
     /// Name by which browsers call this machine; may be repeated
