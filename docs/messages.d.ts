@@ -1263,6 +1263,28 @@ files: number,
  */
 bytes: number, };
 
+export type Connection = { 
+/**
+ * mqtt.
+ */
+door: string, 
+/**
+ * Address of the other program.
+ */
+address: string, 
+/**
+ * Why it is not connected; null if it is.
+ */
+problem: string | null, 
+/**
+ * Messages that were handed over since the start.
+ */
+sent: number, 
+/**
+ * Messages that were not, because too many waited.
+ */
+lost: number, };
+
 export type SettingsState = { 
 /**
  * The text of station.toml.
@@ -1292,6 +1314,10 @@ recordings: string,
  * Other machines may open the screen, with the password.
  */
 secured: boolean, 
+/**
+ * Links to other programs that were named when the program was started.
+ */
+connections: Array<Connection>, 
 /**
  * Newest first.
  */
