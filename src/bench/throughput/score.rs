@@ -171,7 +171,7 @@ mod tests {
         let slanted = Task { scene: SceneKind::Slanted, ..task };
         let mut apart = points(&slanted, 0, 0.0);
         apart.iter_mut().enumerate().for_each(|(i, p)| {
-            let by = if i % 2 == 0 { 0.25 } else { -0.25 };
+            let by = if i % 2 == 0 { 0.4 } else { 0.6 };
             (p.u, p.v) = (p.u + by, p.v + by * slanted.lines(0)[0].slope(f64::from(p.u)) as f32);
         });
         assert_eq!(scored(&slanted, &apart).found, Some(1.0));
