@@ -1,7 +1,8 @@
 // Fits one peak at each skeleton pixel of a batch. A peak that fails a test needing no other peak gets the reason for
 // rejection. The strongest of the others on each line across the stripe is stored for the comparison in point.wgsl.
-// Units: pixels, grey levels. Twin: src/stages/peak/fit.rs, across/centre.rs, across/direction.rs, profile.rs,
-// scoring.rs, methods.rs and stripe/choose.rs, which explains the reasons; docs/math.md, Stripe peak (0) to (5).
+// Units: pixels, grey levels. Twin: src/stages/peak/fit.rs, across/centre.rs, across/direction.rs, windows.rs,
+// profile.rs, scoring.rs, methods.rs and stripe/choose.rs, which explains the reasons; docs/math.md, Stripe peak (0) to
+// (5).
 @group(0) @binding(0) var<uniform> frame: PeakFrame;
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 @group(0) @binding(2) var<storage, read> header: array<u32>;

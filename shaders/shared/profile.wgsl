@@ -1,6 +1,6 @@
 // In: a picture, a skeleton pixel, the direction across the stripe. Out: the stripe's profile there, averaged along it.
-// Twin and reasons: src/stages/peak/profile.rs; docs/math.md, Stripe peak (2). Frame and unit: offsets from the
-// skeleton pixel, px; grey levels.
+// Twin and reasons: src/stages/peak/windows.rs, profile.rs; docs/math.md, Stripe peak (2). Frame and unit: offsets from
+// the skeleton pixel, px; grey levels.
 //
 // Work on every sample is unrolled by hand into calls with constant arguments, so that samples are in registers. An
 // array with an index that is known only at run time is in memory, which Mesa's software adapter reads and writes lane

@@ -245,7 +245,7 @@ impl Registers {
     }
 }
 
-/// The number after this one; 0 is none.
+/// The request number that follows this one: 1 to 65535, then 1 again.
 fn next(number: u16) -> u16 {
     number.checked_add(1).unwrap_or(1)
 }
