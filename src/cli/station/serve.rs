@@ -161,7 +161,9 @@ const CA_BYTES: u64 = 4_000_000;
 /// The MQTT broker that was named.
 fn broker(args: &Serve) -> Result<Option<Broker>> {
     let Some(uri) = &args.mqtt else { return Ok(None) };
-    let folder = || args.station.file_name().map_or("station".into(), |n| n.to_string_lossy().into_owned());
+    // `.` has no name, the folder that it means has.
+    let station = std::path::absolute(&args.station).unwrap_or_else(|_| args.station.clone());
+    let folder = || station.file_name().map_or("station".into(), |n| n.to_string_lossy().into_owned());
     let topic = args.mqtt_topic.clone().unwrap_or_else(|| format!("sheetlight/{}", folder()));
     let login = args.mqtt_login.as_deref().map(crate::files::read_text).transpose()?;
     let authority = args.mqtt_ca.as_deref().map(|file| crate::files::read(file, CA_BYTES)).transpose()?;

@@ -66,7 +66,7 @@ impl Broker {
         }
         let levels = topic.split('/').all(|level| !level.is_empty());
         if !levels || topic.starts_with('$') || topic.contains(['+', '#']) || topic.chars().any(char::is_control) {
-            return Err(Fault::usage(format!("topic '{topic}': empty levels, + and #, or $ at its beginning"))
+            return Err(Fault::usage(format!("topic '{topic}' has an empty level, + or #, or begins with $"))
                 .cause("brokers keep these characters for subscriptions and for themselves")
                 .next("name a topic such as sheetlight/cell3 with --mqtt-topic"));
         }
@@ -86,7 +86,9 @@ impl Broker {
 
     /// The broker's address, for messages.
     pub fn name(&self) -> String {
-        format!("{}://{}:{}", if self.tls.is_some() { "mqtts" } else { "mqtt" }, self.host, self.port)
+        let scheme = if self.tls.is_some() { "mqtts" } else { "mqtt" };
+        let host = if self.host.contains(':') { format!("[{}]", self.host) } else { self.host.clone() };
+        format!("{scheme}://{host}:{}", self.port)
     }
 
     /// A topic of this station.
@@ -131,8 +133,8 @@ mod tests {
         assert_eq!(name("mqtt://broker").unwrap(), "mqtt://broker:1883");
         assert_eq!(name("mqtts://broker").unwrap(), "mqtts://broker:8883");
         assert_eq!(name("mqtt://10.0.0.7:99").unwrap(), "mqtt://10.0.0.7:99");
-        assert_eq!(name("mqtt://[::1]:99").unwrap(), "mqtt://::1:99");
-        assert_eq!(name("mqtt://[::1]").unwrap(), "mqtt://::1:1883");
+        assert_eq!(name("mqtt://[::1]:99").unwrap(), "mqtt://[::1]:99");
+        assert_eq!(name("mqtt://[::1]").unwrap(), "mqtt://[::1]:1883");
         for wrong in ["broker", "http://broker", "mqtt://", "mqtt://a:0", "mqtt://a:x", "mqtt://u:p@a", "mqtt://a/b"] {
             assert!(!name(wrong).unwrap_err().next.is_empty(), "{wrong}");
         }
