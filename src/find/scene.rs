@@ -4,6 +4,7 @@
 
 use crate::fault::{Fault, Result};
 use crate::raster::{Image, Mask};
+use crate::scan::HeightMap;
 
 /// What a layer's numbers are; a model edge is searched only in layers of its own kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -177,6 +178,11 @@ impl Scene {
     /// A picture's grey levels as the only layer, without scale.
     pub fn from_image(image: &Image) -> Scene {
         Scene { layers: vec![Layer::from_image(image)], mm_per_px: None }
+    }
+    /// A height map's heights as the only layer, with its scale. Refuses infinite heights.
+    pub fn from_heights(map: &HeightMap) -> Result<Scene> {
+        let layer = Layer::new(Kind::Height, map.width as usize, map.height as usize, map.z.clone())?;
+        Scene::new(vec![layer], Some(map.cell))
     }
     /// Like `from_image`, but the cells where `hidden` is set are missing.
     pub fn from_image_in_part(image: &Image, hidden: Option<&Mask>) -> Scene {

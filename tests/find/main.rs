@@ -9,6 +9,7 @@ mod chain;
 mod coarse;
 mod dxf;
 mod insertion;
+mod maps;
 mod matching;
 mod pairs;
 mod photos;

@@ -1,6 +1,7 @@
-//! In: a part's template and pictures. Out: the part's position in each picture: JSON, CSV, a picture with the
-//! matches drawn in.
-//! Frame and unit: pixels of each picture (x right, y down, an integer is a pixel's centre); degrees, x towards y.
+//! In: a part's template and pictures or height maps. Out: the part's position in each of them: JSON, CSV, a picture
+//! with the matches drawn in.
+//! Frame and unit: pixels of each picture, cells of each map (x right, y down, an integer is a centre); in maps also mm
+//! in the grid frame; degrees, x towards y.
 
 use crate::cli::terminal::arguments::{numbers, parse};
 use crate::cli::terminal::console::Console;
@@ -11,26 +12,29 @@ use crate::find::search::picture::draw;
 use crate::find::{Accelerator, Area, Match, ModelOptions, Scene, SearchOptions, Template, find_in};
 use crate::raster::{Channel, Depth, Image, decode_in_part, load_in_part};
 use crate::rig::hash_text;
+use crate::scan::HeightMap;
 use std::path::{Path, PathBuf};
 
-/// Find a part in pictures by its edges
+/// Find a part in pictures or height maps by its edges
 ///
 /// The template is a picture that shows the part, whole or in --template-region, or a file that sheetlight teach
-/// PICTURE --region wrote. The score is the mean cosine between the template's directions and the picture's: a part
-/// of which three tenths are hidden scores about 0.7. If nothing is found, the list is empty and the exit code is 0.
+/// --region wrote. Scan folders in place of pictures are searched by their heights; cells without a height count half.
+/// The score is the mean cosine between the template's directions and the picture's: a part of which three tenths are
+/// hidden scores about 0.7. If nothing is found, the list is empty and the exit code is 0.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight match clip.png table.png --out clips.json
   sheetlight match board.png line1.png line2.png --template-region 210,90,64,40 --all \\
       --angles -5..5 --out resistors.json
+  sheetlight match plate1 plate2 --template-region 300,220,180,180 --out stars.json
   sheetlight teach board.png --name resistor --region 210,90,64,40 --out resistor.json
   sheetlight match resistor.json line1.png --all --scales 0.9..1.1 --score 0.7 \\
       --polygon 100,80,900,80,900,700,100,700 --out found.json
 Guide: docs/match.md")]
 pub struct Args {
-    /// Picture of the part, or a template from teach --region (.json)
+    /// Picture or scan of the part, or a template from teach --region (.json)
     template: PathBuf,
-    /// Pictures to search: PNG, JPEG, TIFF, BMP, PGM
+    /// Pictures to search (PNG, JPEG, TIFF, BMP, PGM), or scan folders
     #[arg(required = true)]
     pictures: Vec<PathBuf>,
     /// Part in the template's picture, px: x,y of the top left pixel, width, height [default: all]
@@ -92,6 +96,11 @@ struct Found {
 struct Listed {
     x_px: f64,
     y_px: f64,
+    /// In the map's grid frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    x_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    y_mm: Option<f64>,
     angle_deg: f64,
     scale: f64,
     score: f64,
@@ -121,22 +130,19 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let overlays = overlays(args);
     let results: Vec<PathBuf> =
         args.out.iter().flat_map(|o| [o.clone(), o.with_extension("csv")]).chain(overlays.iter().cloned()).collect();
-    let inputs: Vec<&Path> = args.pictures.iter().chain([&args.template]).map(PathBuf::as_path).collect();
+    let inputs = args.pictures.iter().chain([&args.template]).map(PathBuf::as_path);
+    let (scans, files): (Vec<&Path>, Vec<&Path>) = inputs.partition(|path| path.is_dir());
     let results: Vec<&Path> = results.iter().map(PathBuf::as_path).collect();
-    outputs::check(&results, &Inputs { files: &inputs, ..Inputs::default() })?;
+    outputs::check(&results, &Inputs { files: &files, scans: &scans, ..Inputs::default() })?;
     let template = template(args)?;
     let accelerator = Accelerator::open();
     let (mut all, mut drawn) = (Vec::new(), Vec::new());
     for (k, path) in args.pictures.iter().enumerate() {
-        let (image, hidden) = load_in_part(path, args.channel, depth(args.bits))?;
-        let matches = find_in(
-            &Scene::from_image_in_part(&image, hidden.as_ref()),
-            &template.model,
-            &options,
-            area.as_ref(),
-            accelerator.as_ref(),
-        )
-        .map_err(|e| e.at(path.display()))?;
+        let (scene, image) = searched(path, args)?;
+        let at = |e: Fault| e.at(path.display());
+        let cells = template.cells_in(&scene).map_err(at)?;
+        let options = SearchOptions { scales: options.scales.map(|s| s * cells), ..options.clone() };
+        let matches = find_in(&scene, &template.model, &options, area.as_ref(), accelerator.as_ref()).map_err(at)?;
         if let Some(file) = overlays.get(k) {
             drawn.push((file, draw(&image, &template.model, &matches).to_png()));
         }
@@ -144,11 +150,11 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             picture: path.display().to_string(),
             width: image.width,
             height: image.height,
-            matches: matches.into_iter().map(|m| listed(m, &options)).collect(),
+            matches: matches.into_iter().map(|m| listed(m, &options, cells, scene.mm_per_px)).collect(),
         });
     }
     let said =
-        serde_json::json!({"format": 1, "units": "px, degrees", "template": said_of(&template), "pictures": all});
+        serde_json::json!({"format": 1, "units": units(&template), "template": said_of(&template), "pictures": all});
     if let Some(out) = &args.out {
         let csv = table(&all);
         let csv_file = out.with_extension("csv");
@@ -205,7 +211,25 @@ fn depth(bits: u8) -> Depth {
 /// Most bytes of a picture file from which a part is taught.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// The part in a region of a picture file, and the picture.
+/// What is searched: the height map of a scan folder, or a picture; and a picture to draw on.
+fn searched(path: &Path, args: &Args) -> Result<(Scene, Image)> {
+    if path.is_dir() {
+        let map = HeightMap::load(path)?;
+        return Ok((Scene::from_heights(&map).map_err(|e| e.at(path.display()))?, grey(&map)));
+    }
+    let (image, hidden) = load_in_part(path, args.channel, depth(args.bits))?;
+    Ok((Scene::from_image_in_part(&image, hidden.as_ref()), image))
+}
+
+/// Heights as grey levels from 40 to 255, the lowest and highest hundredth cut off; black where nothing was measured.
+fn grey(map: &HeightMap) -> Image {
+    let (low, high) = map.quantiles(0.01, 0.99).unwrap_or((0.0, 1.0));
+    let span = (high - low).max(1e-6);
+    let level = |z: &f32| if z.is_finite() { 40 + (215.0 * ((z - low) / span).clamp(0.0, 1.0)) as u8 } else { 0 };
+    Image::from_u8(map.width, map.height, map.z.iter().map(level).collect())
+}
+
+/// The part in a region of a picture file or of a scan's height map, and the picture.
 pub(super) fn taught(
     path: &Path,
     name: &str,
@@ -223,10 +247,16 @@ pub(super) fn taught(
                 .next("give x,y of the top left pixel, width and height"));
         }
     };
-    let bytes = crate::files::read(path, MOST_BYTES)?;
     let at = |e: Fault| e.at(path.display());
+    let named = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    if path.is_dir() {
+        let map = HeightMap::load(path)?;
+        let source = (named, hash_text(&crate::files::read(&path.join("height.tif"), MOST_BYTES)?));
+        return Ok((Template::teach_map(name, &map, region, source, options).map_err(at)?, grey(&map)));
+    }
+    let bytes = crate::files::read(path, MOST_BYTES)?;
     let (image, hidden) = decode_in_part(&bytes, channel, depth(bits)).map_err(at)?;
-    let source = (path.file_name().unwrap_or_default().to_string_lossy().into_owned(), hash_text(&bytes));
+    let source = (named, hash_text(&bytes));
     Ok((Template::teach_in_part(name, &image, hidden.as_ref(), region, source, options).map_err(at)?, image))
 }
 
@@ -240,22 +270,32 @@ fn overlays(args: &Args) -> Vec<PathBuf> {
     (1..=args.pictures.len()).map(|k| out.with_file_name(format!("{stem}_{k}.png"))).collect()
 }
 
-fn said_of(t: &Template) -> serde_json::Value {
-    serde_json::json!({"name": t.name, "picture": t.picture, "picture_sha256": t.picture_sha256,
-        "region_px": t.region_px,
-        "edges": t.model.levels[0].len(), "reference": "the middle of the region"})
+fn units(t: &Template) -> &'static str {
+    if t.mm_per_px.is_some() { "px, mm, degrees" } else { "px, degrees" }
 }
 
-fn listed(m: Match, options: &SearchOptions) -> Listed {
+fn said_of(t: &Template) -> serde_json::Value {
+    let mut said = serde_json::json!({"name": t.name, "picture": t.picture, "picture_sha256": t.picture_sha256,
+        "region_px": t.region_px, "edges": t.model.levels[0].len(), "reference": "the middle of the region"});
+    if let Some(mm) = t.mm_per_px {
+        said["mm_per_px"] = mm.into();
+    }
+    said
+}
+
+fn listed(m: Match, options: &SearchOptions, cells: f64, mm_per_px: Option<f64>) -> Listed {
+    let mm = |px: f64| mm_per_px.map(|mm| (px + 0.5) * mm);
     Listed {
         x_px: m.pose.x,
         y_px: m.pose.y,
+        x_mm: mm(m.pose.x),
+        y_mm: mm(m.pose.y),
         angle_deg: options.turn_deg(m.pose.angle),
-        scale: m.pose.scale,
+        scale: m.pose.scale / cells,
         score: m.score,
         sigma_px: m.sigma_px,
         sigma_deg: m.sigma_deg,
-        sigma_scale: m.sigma_scale,
+        sigma_scale: m.sigma_scale / cells,
         edges: m.edges,
         edge_rms_px: m.edge_rms_px,
         second_score: m.second_score,

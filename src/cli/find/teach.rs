@@ -1,4 +1,4 @@
-//! In: a scan folder and the part's outline, windows and holes in its height map, or a picture and a region of it.
+//! In: a scan folder and the part's outline, windows and holes in its height map, or a region of a map or a picture.
 //! Out: a recipe, tested on that scan, and a picture of the result; or a template for `match` and a picture of its
 //! edges.
 //! Frame and unit: height map's grid frame, mm from its corner; pixels of the picture.
@@ -21,21 +21,22 @@ use std::path::{Path, PathBuf};
 /// The numbers are millimetres in the height map that scan.json and height.png show (from its corner, x along
 /// columns, y along rows). Half a millimetre is close enough; the points give the exact dimensions.
 ///
-/// With --region a picture is taught instead of a scan: the region becomes a template that sheetlight match finds in
-/// other pictures.
+/// With --region the part is taught by example: the region of a picture, or of a scan's height map, becomes a template.
+/// sheetlight match finds it in other pictures, or in the maps of other scans.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight teach board.png --name relay --region 210,90,64,40 --out relay.json
+  sheetlight teach scans/plate --name star --region 300,220,180,180 --out star.json
   sheetlight teach scans/board7 --name relay --outline 84,20,104.4,32.8 --window 89,24,99.4,28.4 \\
       --hole 86.5,22.5,0.72 --hole 101.7,30.2,0.72 --out relay.toml
 Guide: docs/finding-and-inserting.md")]
 pub struct Args {
-    /// Folder from sheetlight scan --out; with --region a picture
+    /// Folder from sheetlight scan --out; with --region a picture too
     scan: PathBuf,
     /// Name of the part
     #[arg(long)]
     name: String,
-    /// Part in the picture, px: x,y of the top left pixel, width, height
+    /// Part in the picture or map, px: x,y of the top left pixel, width, height
     #[arg(long, value_name = "X,Y,W,H", value_parser = crate::cli::terminal::arguments::numbers::<4>,
         conflicts_with_all = ["outline", "angle_deg", "windows", "holes"])]
     region: Option<[f64; 4]>,
@@ -93,7 +94,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
 
 /// Teaches a template from the picture's region.
 fn template(args: &Args, picture: &Path, console: &Console) -> Result<()> {
-    outputs::check(&[&args.out, picture], &Inputs { files: &[&args.scan], ..Inputs::default() })?;
+    let source: &[&Path] = &[&args.scan];
+    let (files, scans) = if args.scan.is_dir() { (&[][..], source) } else { (source, &[][..]) };
+    outputs::check(&[&args.out, picture], &Inputs { files, scans, ..Inputs::default() })?;
     let options = ModelOptions { contrast: args.contrast, ..ModelOptions::default() };
     let (template, image) = taught(&args.scan, &args.name, args.region, (args.channel, args.bits), &options)?;
     let [x, y, w, h] = template.region_px.map(f64::from);

@@ -1,13 +1,15 @@
-//! In: a picture and the region of it that shows the part, or a file made from them. Out: a model with its origin, for
-//! searches in other pictures; the file.
-//! Frame and unit: pixels of the picture; points of the model about the region's middle, turn 0 as in the picture.
+//! In: a picture or a height map and the region of it that shows the part, or a file made from them. Out: a model with
+//! its origin, for searches in other pictures or maps; the file.
+//! Frame and unit: pixels of the picture, cells of the map; points of the model about the region's middle, turn 0 as
+//! in the picture.
 
 use super::shape_model::{MIN_POINTS, ModelOptions, ModelPoint, ShapeModel};
 use crate::fault::{Fault, Result};
 use crate::find::scene::{Kind, Region, Scene};
 use crate::raster::{Image, Mask};
+use crate::scan::HeightMap;
 
-/// A part as one picture shows it. `teach --region` writes it and `match` reads it.
+/// A part as one picture or height map shows it. `teach --region` writes it and `match` reads it.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Template {
@@ -15,10 +17,13 @@ pub struct Template {
     pub format: u32,
     /// Name of the part.
     pub name: String,
-    /// Name of the picture that it was taught from, as stated then.
+    /// Name of the picture or scan that it was taught from, as stated then.
     pub picture: String,
-    /// SHA-256 of that picture's file.
+    /// SHA-256 of that picture's file, or of the map's height.tif.
     pub picture_sha256: String,
+    /// Edge of a cell of the height map, mm; `None` for a picture.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mm_per_px: Option<f64>,
     /// Region of the part in that picture: x, y of its top left pixel, width, height; px.
     pub region_px: [u32; 4],
     /// How the edges were chosen.
@@ -63,8 +68,7 @@ impl Template {
         options: &ModelOptions,
     ) -> Result<Template> {
         let [x, y, w, h] = region.unwrap_or([0, 0, image.width, image.height]);
-        let end = |a: u32, b: u32| a as usize + b as usize;
-        let cells = Region { x0: x as usize, y0: y as usize, x1: end(x, w), y1: end(y, h) };
+        let cells = cells([x, y, w, h]);
         let model = match hidden {
             None => ShapeModel::from_region(&Scene::from_image(image), cells, None, options)?,
             Some(hidden) => {
@@ -83,10 +87,61 @@ impl Template {
             name: name.into(),
             picture: source.0,
             picture_sha256: source.1,
+            mm_per_px: None,
             region_px: [x, y, w, h],
             options: *options,
             model,
         })
+    }
+
+    /// Learns what `region` of a height map shows. Cells without a height make no edge. `source` is the scan's name and
+    /// the SHA-256 of its height.tif.
+    ///
+    /// # Errors
+    /// A region that leaves the map, one without a clear outline.
+    pub fn teach_map(
+        name: &str,
+        map: &HeightMap,
+        region: Option<[u32; 4]>,
+        source: (String, String),
+        options: &ModelOptions,
+    ) -> Result<Template> {
+        let region_px = region.unwrap_or([0, 0, map.width, map.height]);
+        let model = ShapeModel::from_region(&Scene::from_heights(map)?, cells(region_px), None, options)?;
+        let (picture, picture_sha256) = source;
+        let mm_per_px = Some(map.cell);
+        Ok(Template {
+            format: 1,
+            name: name.into(),
+            picture,
+            picture_sha256,
+            mm_per_px,
+            region_px,
+            options: *options,
+            model,
+        })
+    }
+
+    /// How many cells of a scene one cell of the template is: 1 for pictures, which have no scale of their own.
+    ///
+    /// # Errors
+    /// A picture's template for a map or the other way round; cells of very different sizes.
+    pub fn cells_in(&self, scene: &Scene) -> Result<f64> {
+        match (self.mm_per_px, scene.mm_per_px) {
+            (None, None) => Ok(1.0),
+            (Some(own), Some(cell)) if (0.5..=2.0).contains(&(own / cell)) => Ok(own / cell),
+            (Some(own), Some(cell)) => Err(Fault::input(format!(
+                "the map's cells are {cell} mm wide, those of the template {own} mm; allowed: half to twice as wide"
+            ))
+            .cause("a scan with other steps or of another sensor")
+            .next("grid the scan with cells as wide as the template's, or teach the part on such a map")),
+            (Some(_), None) => Err(Fault::usage("a picture is searched for a part that a height map taught")
+                .cause("a picture in place of a scan folder")
+                .next("give a scan folder, or teach the part from a picture: its grey levels are other edges")),
+            (None, Some(_)) => Err(Fault::usage("a height map is searched for a part that a picture taught")
+                .cause("a scan folder in place of a picture")
+                .next("give a picture, or teach the part from a scan folder: its heights are other edges")),
+        }
     }
 
     /// Parses a file and checks every number in it.
@@ -104,12 +159,22 @@ impl Template {
             return Err(strange(format!("format {}, this version reads 1", template.format)));
         }
         template.options.check().map_err(|e| strange(e.what))?;
-        check(&template.model).map_err(strange)?;
+        check(&template).map_err(strange)?;
         Ok(template)
     }
 }
 
-fn check(model: &ShapeModel) -> std::result::Result<(), String> {
+fn cells([x, y, w, h]: [u32; 4]) -> Region {
+    let end = |a: u32, b: u32| a as usize + b as usize;
+    Region { x0: x as usize, y0: y as usize, x1: end(x, w), y1: end(y, h) }
+}
+
+fn check(template: &Template) -> std::result::Result<(), String> {
+    let (model, kind) = match template.mm_per_px {
+        None => (&template.model, Kind::Intensity),
+        Some(mm) if mm > 0.0 && mm.is_finite() => (&template.model, Kind::Height),
+        Some(mm) => return Err(format!("cells of {mm} mm; allowed: above 0")),
+    };
     if !(1..=8).contains(&model.levels.len()) {
         return Err(format!("{} levels; allowed: 1 to 8", model.levels.len()));
     }
@@ -123,7 +188,7 @@ fn check(model: &ShapeModel) -> std::result::Result<(), String> {
         }
         let strange = |p: &ModelPoint| {
             let unit = (p.gx.hypot(p.gy) - 1.0).abs() < 1e-6;
-            !(p.x.hypot(p.y) <= FARTHEST_PX && unit && p.kind == Kind::Intensity)
+            !(p.x.hypot(p.y) <= FARTHEST_PX && unit && p.kind == kind)
         };
         if let Some(p) = points.iter().find(|p| strange(p)) {
             return Err(format!("an edge at {}, {} with direction {}, {}", p.x, p.y, p.gx, p.gy));
