@@ -6,6 +6,7 @@ pub mod dxf;
 pub mod insert;
 pub mod look;
 pub mod measure;
+mod mend;
 pub mod model;
 pub mod scene;
 pub mod search;

@@ -2,6 +2,7 @@
 //! Frame and unit: pixels, x right (along columns), y down (along rows), an integer is a cell's centre;
 //! values in grey levels (intensity) or mm (height).
 
+use super::mend::mended;
 use crate::fault::{Fault, Result};
 use crate::raster::{Image, Mask};
 use crate::scan::HeightMap;
@@ -179,9 +180,11 @@ impl Scene {
     pub fn from_image(image: &Image) -> Scene {
         Scene { layers: vec![Layer::from_image(image)], mm_per_px: None }
     }
-    /// A height map's heights as the only layer, with its scale. Refuses infinite heights.
+    /// A height map's heights as the only layer, with its scale. Spikes of single cells are removed and small gaps
+    /// filled, so that neither hides an edge. Refuses infinite heights.
     pub fn from_heights(map: &HeightMap) -> Result<Scene> {
-        let layer = Layer::new(Kind::Height, map.width as usize, map.height as usize, map.z.clone())?;
+        let layer =
+            Layer::new(Kind::Height, map.width as usize, map.height as usize, mended(&map.z, map.width as usize))?;
         Scene::new(vec![layer], Some(map.cell))
     }
     /// Like `from_image`, but the cells where `hidden` is set are missing.
