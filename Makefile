@@ -1,6 +1,7 @@
 # make station  build, serve the operator's screen on a simulated station in ./demo-cell
 # make demo   build, simulate a station, scan it, leave ./demo/index.html
 # make test   everything, on software Vulkan where it can be had
+# make gentl  the GenTL producer, by which GenICam programs see a 3-D camera: target/release/sheetlight.cti
 # make bench  figures of this machine;  make bench-peers  side by side with OpenCV and numba
 
 CARGO ?= cargo
@@ -9,7 +10,8 @@ VENV := .venv
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 export XDG_RUNTIME_DIR ?= $(shell mktemp -d /tmp/sheetlight-run.XXXXXX)
 
-.PHONY: station browser demo pages book lint test bench bench-entries bench-peers vulkan python notebooks pictures cameras build clean
+.PHONY: station browser demo pages book lint test gentl bench bench-entries bench-peers vulkan python notebooks pictures \
+	cameras build clean
 
 demo: vulkan build
 	$(TARGET)/release/sheetlight demo --out demo
@@ -21,9 +23,10 @@ station: vulkan build
 build:
 	$(CARGO) build --release --locked
 
+# All packages at once: so the library has the same features for all of them, and is compiled once.
 test: vulkan python cameras browser lint
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(if $(SHEETLIGHT_REQUIRE_GPU),,SHADER_TWIN_ALLOW_SKIP=1) \
-		$(CARGO) test --locked --package sheetlight --package shader-twin -- --show-output
+		$(CARGO) test --locked --package sheetlight --package shader-twin --package sheetlight-gentl -- --show-output
 
 # A toolchain without clippy says so and goes on.
 # The pages of the screen: format and types.
@@ -36,12 +39,18 @@ book:
 
 lint: pages book
 	if $(CARGO) clippy --version >/dev/null 2>&1; then \
-		$(CARGO) clippy --locked --package sheetlight --package shader-twin --all-targets -- -D warnings; \
+		$(CARGO) clippy --locked --package sheetlight --package shader-twin --package sheetlight-gentl --all-targets \
+			-- -D warnings; \
 	else echo "clippy is not installed: skipped"; fi
 	$(CARGO) check --locked --package outside
 	if $(CARGO) clippy --version >/dev/null 2>&1; then \
 		$(CARGO) clippy --locked --package sheetlight-python --features whole -- -D warnings; fi
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --package sheetlight --package shader-twin
+
+# The GenTL producer, under the name by which GenICam programs look for it.
+gentl:
+	$(CARGO) build --release --locked --package sheetlight-gentl
+	cp -f $(TARGET)/release/libsheetlight_gentl.so $(TARGET)/release/sheetlight.cti
 
 bench: vulkan build
 	$(TARGET)/release/sheetlight bench
@@ -80,6 +89,7 @@ cameras:
 python:
 	tools/python-env.sh $(VENV) test
 	tools/python-env.sh $(VENV) files
+	tools/python-env.sh $(VENV) genicam
 
 # The figures of docs/python.md: the last one of each notebook, with this Python package, installed aside.
 SITE := $(abspath $(TARGET))/site

@@ -1,16 +1,17 @@
 #!/usr/bin/env bash
 # In: nothing. Out: what the tests talk to, where it is missing and we are allowed to install it: ffmpeg, a GigE Vision
-# camera that is none (aravis-tools), an MQTT broker (mosquitto).
+# camera that is none (aravis-tools), an MQTT broker (mosquitto), and valgrind for the GenTL producer.
 # With CI=true a machine that still lacks one is a failure; for a user it is a sentence.
 set -eu
 PATH="$PATH:/usr/sbin"
-have() { command -v ffmpeg && command -v arv-fake-gv-camera-0.8 && command -v mosquitto; } >/dev/null
+have() { command -v ffmpeg && command -v arv-fake-gv-camera-0.8 && command -v mosquitto && command -v valgrind; } >/dev/null
 if ! have && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
-  echo "installing ffmpeg, aravis-tools and mosquitto for the tests of cameras and of the broker" >&2
+  echo "installing ffmpeg, aravis-tools, mosquitto and valgrind for the tests of cameras and of the broker" >&2
   # Debian starts a broker on port 1883 when it installs one; the tests start their own.
-  { apt-get -qq update && RUNLEVEL=1 DEBIAN_FRONTEND=noninteractive apt-get -qq install -y ffmpeg aravis-tools mosquitto; } \
+  { apt-get -qq update && RUNLEVEL=1 DEBIAN_FRONTEND=noninteractive apt-get -qq install -y ffmpeg aravis-tools mosquitto \
+    valgrind; } \
     >/dev/null 2>&1 || true
 fi
 if have; then exit 0; fi
-echo "ffmpeg, arv-fake-gv-camera-0.8 or mosquitto is missing: tests that need them are skipped" >&2
+echo "ffmpeg, arv-fake-gv-camera-0.8, mosquitto or valgrind is missing: tests that need them are skipped" >&2
 [ "${CI:-}" != true ]

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes a Python environment with a set of packages (test, files, peers) in a folder: for judges, peers and the tests of
-# the Python package. `files` has what its files, conversions, notebooks and tables need and are read again with: 0.7 GB,
+# Makes a Python environment with a set of packages (test, files, genicam, peers) in a folder: for judges, peers and the
+# tests of the Python package. `genicam` has a GenICam program, which tests the GenTL producer. `files` has what its files, conversions, notebooks and tables need and are read again with: 0.7 GB,
 # half of them OpenCV and Arrow. Ray (0.25 GB) is installed by hand: pip install ray. Sheetlight itself never needs
 # Python; without one the tests that need it say that they were skipped.
 set -eu
@@ -9,8 +9,9 @@ case $set in
   test) packages="numpy scipy libigl maturin==1.* mypy prometheus-client pytest" ;;
   files) packages="duckdb laspy[lazrs] matplotlib mcap mcap-ros2-support opencv-contrib-python-headless==4.14.* pyarrow pye57"
     packages="$packages paho-mqtt==2.* pymodbus==3.16.* pypcd4 rosbags tifffile trimesh xarray" ;;
+  genicam) packages="harvesters==1.4.* numpy" ;;
   peers) packages="numpy scipy numba opencv-contrib-python-headless==4.14.*" ;;
-  *) echo "python-env.sh: unknown set '$set': test, files or peers" >&2; exit 2 ;;
+  *) echo "python-env.sh: unknown set '$set': test, files, genicam or peers" >&2; exit 2 ;;
 esac
 # Holds the packages, so that an environment of a former version gets what is new.
 stamp="$folder/.has-$set"

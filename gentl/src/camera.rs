@@ -401,11 +401,8 @@ const COMPONENTS: &[Choice] = &[
     choice("Range", component::RANGE),
     choice("Confidence", component::CONFIDENCE),
 ];
-const MODES: &[Choice] = &[
-    choice("SingleFrame", mode::SINGLE),
-    choice("MultiFrame", mode::MULTI),
-    choice("Continuous", mode::CONTINUOUS),
-];
+const MODES: &[Choice] =
+    &[choice("SingleFrame", mode::SINGLE), choice("MultiFrame", mode::MULTI), choice("Continuous", mode::CONTINUOUS)];
 const OUTPUTS: &[Choice] = &[
     choice("RectifiedC", output::RECTIFIED_C),
     choice("CalibratedABC_Grid", output::GRID),
@@ -463,18 +460,19 @@ pub fn table() -> Table {
     let trigger_on = Kind::Choice(const { &[choice("Off", 0), choice("On", 1)] });
     let trigger_by = Kind::Choice(const { &[choice("Software", 0), choice("NewScan", 1)] });
     let rate = Kind::Float { least: 0.001, most: 10_000.0, unit: "Hz" };
-    let acquisition = vec![
-        set("AcquisitionMode", "When an acquisition ends", Kind::Choice(MODES)),
-        set("AcquisitionFrameCount", "Frames of MultiFrame", Kind::Integer { least: 1, most: Most::Is(1 << 32) }),
-        set("AcquisitionFrameRate", "Most frames a second without a trigger", rate),
-        free("AcquisitionStart", "Starts the frames", Kind::Command),
-        free("AcquisitionStop", "Ends the frames", Kind::Command),
-        free("TriggerSelector", "The trigger to set", Kind::Choice(const { &[choice("FrameStart", 0)] }))
-            .selecting(&["TriggerMode", "TriggerSource", "TriggerSoftware"]),
-        set("TriggerMode", "Whether a frame waits for its trigger", trigger_on),
-        set("TriggerSource", "What triggers a frame", trigger_by),
-        free("TriggerSoftware", "Triggers one frame", Kind::Command),
-    ];
+    let acquisition =
+        vec![
+            set("AcquisitionMode", "When an acquisition ends", Kind::Choice(MODES)),
+            set("AcquisitionFrameCount", "Frames of MultiFrame", Kind::Integer { least: 1, most: Most::Is(1 << 32) }),
+            set("AcquisitionFrameRate", "Most frames a second without a trigger", rate),
+            free("AcquisitionStart", "Starts the frames", Kind::Command),
+            free("AcquisitionStop", "Ends the frames", Kind::Command),
+            free("TriggerSelector", "The trigger to set", Kind::Choice(const { &[choice("FrameStart", 0)] }))
+                .selecting(&["TriggerMode", "TriggerSource", "TriggerSoftware"]),
+            set("TriggerMode", "Whether a frame waits for its trigger", trigger_on),
+            set("TriggerSource", "What triggers a frame", trigger_by),
+            free("TriggerSoftware", "Triggers one frame", Kind::Command),
+        ];
     let fixed = |name, about, value| shown(name, about, Kind::Choice(value));
     let scan = vec![
         fixed("Scan3dDistanceUnit", "Unit of coordinates", const { &[choice("Millimeter", 0)] }),

@@ -123,9 +123,7 @@ impl Device {
             (None, (Some(recording), Some(station)), None, None) => {
                 Ok(Origin::Recording { recording: recording.clone(), station: station.clone(), on, grid: grid()? })
             }
-            (None, (None, None), Some(made), None) => {
-                Ok(Origin::Simulated { made: made.clone(), on, grid: grid()? })
-            }
+            (None, (None, None), Some(made), None) => Ok(Origin::Simulated { made: made.clone(), on, grid: grid()? }),
             (None, (None, None), None, Some(folder)) => Ok(Origin::Folder { folder: folder.clone(), grid: grid()? }),
             _ => Err(Fault::input("it is not clear where the frames come from")
                 .next("give one of: scan; recording and station; simulated; folder")),

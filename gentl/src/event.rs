@@ -110,9 +110,7 @@ impl Message {
     pub fn bytes(&self) -> Vec<u8> {
         match self {
             Message::Buffer(b) => [b.handle.to_ne_bytes(), b.user.to_ne_bytes()].concat(),
-            Message::Error { code, text } => {
-                [&code.to_ne_bytes()[..], text.as_bytes(), &[0]].concat()
-            }
+            Message::Error { code, text } => [&code.to_ne_bytes()[..], text.as_bytes(), &[0]].concat(),
         }
     }
 }

@@ -32,9 +32,16 @@ pub struct Choice {
 
 pub enum Kind {
     /// Limits by value, or by another feature's.
-    Integer { least: i64, most: Most },
+    Integer {
+        least: i64,
+        most: Most,
+    },
     /// Limits and unit of a float.
-    Float { least: f64, most: f64, unit: &'static str },
+    Float {
+        least: f64,
+        most: f64,
+        unit: &'static str,
+    },
     Text,
     Choice(&'static [Choice]),
     Boolean,
@@ -98,7 +105,11 @@ impl Feature {
                 if (*least..=most).contains(x) { Ok(()) } else { out(format!("{least}..={most}")) }
             }
             (Kind::Float { least, most, .. }, Value::Float(x)) => {
-                if (*least..=*most).contains(x) { Ok(()) } else { out(format!("{least}..={most}")) }
+                if (*least..=*most).contains(x) {
+                    Ok(())
+                } else {
+                    out(format!("{least}..={most}"))
+                }
             }
             (Kind::Choice(choices), Value::Integer(x)) => {
                 let names = choices.iter().map(|c| c.name).collect::<Vec<_>>().join(", ");
@@ -171,7 +182,8 @@ impl Table {
         if !feature.writable {
             return refuse(error::ACCESS_DENIED, format!("{} is read only", feature.name));
         }
-        let Ok(bytes) = <[u8; NUMBER]>::try_from(bytes).map_err(|_| ()).and_then(|b| if offset == 0 { Ok(b) } else { Err(()) })
+        let Ok(bytes) =
+            <[u8; NUMBER]>::try_from(bytes).map_err(|_| ()).and_then(|b| if offset == 0 { Ok(b) } else { Err(()) })
         else {
             let what = format!("{}: {} bytes at offset {offset}; {NUMBER} at 0 are written", feature.name, bytes.len());
             return refuse(error::INVALID_ADDRESS, what);
@@ -277,9 +289,9 @@ impl Table {
         f.selects.iter().for_each(|s| put(format_args!("  <pSelected>{s}</pSelected>")));
         put(format_args!("</{node}>"));
         match f.kind {
-            Kind::Float { .. } => put(format_args!(
-                "<FloatReg Name=\"{name}_Reg\">{place}<Endianess>LittleEndian</Endianess></FloatReg>"
-            )),
+            Kind::Float { .. } => {
+                put(format_args!("<FloatReg Name=\"{name}_Reg\">{place}<Endianess>LittleEndian</Endianess></FloatReg>"))
+            }
             _ => put(format_args!(
                 "<IntReg Name=\"{name}_Reg\">{place}<Sign>Signed</Sign><Endianess>LittleEndian</Endianess></IntReg>"
             )),

@@ -170,7 +170,9 @@ impl Library {
     pub fn device(&self, id: &str) -> Result<&Entry> {
         match self.devices.iter().find(|(device, _)| device.id == id) {
             Some(entry) => Ok(entry),
-            None => refuse(error::INVALID_ID, format!("no device has the id '{id}'; IFUpdateDeviceList reads the list")),
+            None => {
+                refuse(error::INVALID_ID, format!("no device has the id '{id}'; IFUpdateDeviceList reads the list"))
+            }
         }
     }
 }

@@ -123,16 +123,20 @@ fn interface() -> Vec<Feature> {
         shown("InterfaceType", "Kind of transport", TYPES),
         free("DeviceUpdateList", "Reads the list of devices", Kind::Command),
         shown("SheetlightDeviceLimit", "Greatest value of DeviceSelector", COUNT),
-        free("DeviceSelector", "The device to read", Kind::Integer { least: 0, most: Most::Of("SheetlightDeviceLimit") })
-            .selecting(&[
-                "DeviceID",
-                "DeviceVendorName",
-                "DeviceModelName",
-                "DeviceSerialNumber",
-                "DeviceUserID",
-                "DeviceAccessStatus",
-                "SheetlightDeviceFault",
-            ]),
+        free(
+            "DeviceSelector",
+            "The device to read",
+            Kind::Integer { least: 0, most: Most::Of("SheetlightDeviceLimit") },
+        )
+        .selecting(&[
+            "DeviceID",
+            "DeviceVendorName",
+            "DeviceModelName",
+            "DeviceSerialNumber",
+            "DeviceUserID",
+            "DeviceAccessStatus",
+            "SheetlightDeviceFault",
+        ]),
         shown("DeviceID", "Identifier of the device", Kind::Text),
         shown("DeviceVendorName", "Maker of the device", Kind::Text),
         shown("DeviceModelName", "Where its frames come from", Kind::Text),
@@ -254,9 +258,10 @@ pub fn fault((_, origin): &crate::config::Entry) -> Option<String> {
     let tried = match origin.as_ref().map_err(Clone::clone) {
         Err(fault) => Err(fault),
         Ok(Origin::Scan(scan)) => station::load_report(scan).map(|_| ()),
-        Ok(Origin::Recording { recording, station, .. }) => {
-            Recording::open(recording).and_then(|_| station::Settings::load(station)).and_then(|_| Rig::load(station)).map(|_| ())
-        }
+        Ok(Origin::Recording { recording, station, .. }) => Recording::open(recording)
+            .and_then(|_| station::Settings::load(station))
+            .and_then(|_| Rig::load(station))
+            .map(|_| ()),
         Ok(Origin::Simulated { .. }) => Ok(()),
         Ok(Origin::Folder { folder, .. }) => std::fs::read_dir(folder).map(|_| ()).map_err(|e| Fault::read(folder, e)),
     };

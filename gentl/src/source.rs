@@ -73,8 +73,17 @@ pub enum Source {
         on: Where,
         grid: GridSpec,
     },
-    Simulated { made: Simulated, next: u64, on: Where, grid: GridSpec },
-    Folder { folder: PathBuf, seen: BTreeSet<(PathBuf, String)>, grid: GridSpec },
+    Simulated {
+        made: Simulated,
+        next: u64,
+        on: Where,
+        grid: GridSpec,
+    },
+    Folder {
+        folder: PathBuf,
+        seen: BTreeSet<(PathBuf, String)>,
+        grid: GridSpec,
+    },
 }
 
 impl Source {
@@ -145,7 +154,8 @@ impl Source {
             Source::Simulated { made, next, on, grid } => {
                 let folder = tempfile::tempdir().map_err(|e| Fault::write(&std::env::temp_dir(), e))?;
                 let made = simulate(folder.path(), &options(made, *next), &|_, _| {})?;
-                let (_, recording, _) = made.recordings.first().ok_or_else(|| Fault::output("nothing was simulated"))?;
+                let (_, recording, _) =
+                    made.recordings.first().ok_or_else(|| Fault::output("nothing was simulated"))?;
                 let (rig, settings) = (Rig::load(&made.station)?, Settings::default());
                 let taken = scanned(&Recording::open(recording)?, &rig, &settings, None, (*on, grid), stop)?;
                 *next += 1;

@@ -11,7 +11,6 @@ pub mod error {
     pub const ACCESS_DENIED: i32 = -1005;
     pub const INVALID_HANDLE: i32 = -1006;
     pub const INVALID_ID: i32 = -1007;
-    pub const NO_DATA: i32 = -1008;
     pub const INVALID_PARAMETER: i32 = -1009;
     pub const TIMEOUT: i32 = -1011;
     pub const ABORT: i32 = -1012;

@@ -194,7 +194,10 @@ fn acquire(camera: &Camera, end: &AtomicBool) {
         let current = state.running && state.epoch == begun;
         match taken {
             Ok(Some(taken)) if current => {
-                if let Err(fault) = caught(|| { deliver(camera, &mut state, &taken, buffer); Ok(()) }) {
+                if let Err(fault) = caught(|| {
+                    deliver(camera, &mut state, &taken, buffer);
+                    Ok(())
+                }) {
                     failed(camera, &mut state, fault);
                 }
             }

@@ -102,7 +102,8 @@ static void is_(int32_t got, int32_t want, const char *call, int line) {
   failures++;
 }
 #define IS(call, want) is_((call), (want), #call, __LINE__)
-#define MUST(condition) do { if (!(condition)) { printf("line %d: %s\n", __LINE__, #condition); failures++; } } while (0)
+#define MUST(condition) \
+  do { if (!(condition)) { printf("line %d: %s\n", __LINE__, #condition); failures++; } } while (0)
 
 static long resident_kb(void) {
   long pages = 0, resident = 0;
@@ -217,8 +218,9 @@ static void rounds(int n) {
   }
   long after = resident_kb();
   printf("%d rounds: %ld kB before, %ld kB after\n", n, before, after);
-  /* Pages that the allocator keeps; 10,000 rounds that lost a kilobyte each would be ten times that. */
-  MUST(after - before < 1024);
+  /* The allocator keeps some pages; 10,000 rounds that lost a kilobyte each would be ten times that. Short runs, as
+   * under valgrind, say nothing. */
+  MUST(n < 100 || after - before < 1024);
 }
 
 struct waiter { H event; int32_t result; };

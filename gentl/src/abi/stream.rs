@@ -96,12 +96,7 @@ pub unsafe extern "C" fn DSAnnounceBuffer(
 }
 
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn DSAllocAndAnnounceBuffer(
-    handle: Handle,
-    size: usize,
-    user: Any,
-    buffer: *mut Handle,
-) -> i32 {
+pub unsafe extern "C" fn DSAllocAndAnnounceBuffer(handle: Handle, size: usize, user: Any, buffer: *mut Handle) -> i32 {
     guard(|| {
         stream(handle)?;
         must_be(buffer)?;
@@ -233,13 +228,7 @@ pub extern "C" fn DSStopAcquisition(handle: Handle, flags: i32) -> i32 {
 }
 
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn DSGetInfo(
-    handle: Handle,
-    command: i32,
-    kind: *mut i32,
-    buffer: Any,
-    size: *mut usize,
-) -> i32 {
+pub unsafe extern "C" fn DSGetInfo(handle: Handle, command: i32, kind: *mut i32, buffer: Any, size: *mut usize) -> i32 {
     guard(|| {
         let acquirer = stream(handle)?;
         let bytes = acquirer.camera.state().settings.payload();

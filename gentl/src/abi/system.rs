@@ -119,13 +119,7 @@ pub extern "C" fn TLClose(handle: Handle) -> i32 {
 }
 
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn TLGetInfo(
-    handle: Handle,
-    command: i32,
-    kind: *mut i32,
-    buffer: Any,
-    size: *mut usize,
-) -> i32 {
+pub unsafe extern "C" fn TLGetInfo(handle: Handle, command: i32, kind: *mut i32, buffer: Any, size: *mut usize) -> i32 {
     // SAFETY: the pointers are the caller's own or NULL.
     guard(|| unsafe { system(handle).and_then(|()| system_info(command))?.put(kind, buffer, size) })
 }
@@ -200,13 +194,7 @@ pub extern "C" fn IFClose(handle: Handle) -> i32 {
 }
 
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn IFGetInfo(
-    handle: Handle,
-    command: i32,
-    kind: *mut i32,
-    buffer: Any,
-    size: *mut usize,
-) -> i32 {
+pub unsafe extern "C" fn IFGetInfo(handle: Handle, command: i32, kind: *mut i32, buffer: Any, size: *mut usize) -> i32 {
     // SAFETY: the pointers are the caller's own or NULL.
     guard(|| unsafe { interface(handle).and_then(|()| interface_info(command))?.put(kind, buffer, size) })
 }
