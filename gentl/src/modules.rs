@@ -262,7 +262,7 @@ pub fn fault((_, origin): &crate::config::Entry) -> Option<String> {
             .and_then(|_| station::Settings::load(station))
             .and_then(|_| Rig::load(station))
             .map(|_| ()),
-        Ok(Origin::Simulated { .. }) => Ok(()),
+        Ok(Origin::Simulated { made, .. }) => crate::source::options(made, 0).check(),
         Ok(Origin::Folder { folder, .. }) => std::fs::read_dir(folder).map(|_| ()).map_err(|e| Fault::read(folder, e)),
     };
     tried.err().map(|fault| fault.to_string())

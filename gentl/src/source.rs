@@ -173,7 +173,8 @@ impl Source {
     }
 }
 
-fn options(made: &Simulated, n: u64) -> SimulateOptions {
+/// What is simulated for frame `n`.
+pub fn options(made: &Simulated, n: u64) -> SimulateOptions {
     SimulateOptions {
         seed: made.seed.wrapping_add(n),
         width: made.width,

@@ -451,7 +451,8 @@ static void kills(struct open *o) {
   usleep(20000);
   IS(GCCloseLib(), OK);
   pthread_join(threads[0], NULL);
-  MUST(w[0].result == ABORTED || w[0].result == BAD_HANDLE);
+  /* On a busy machine the thread may have begun only after that. */
+  MUST(w[0].result == ABORTED || w[0].result == BAD_HANDLE || w[0].result == NOT_INITIALIZED);
   IS(DSClose(o->ds), NOT_INITIALIZED);
 }
 

@@ -4,6 +4,8 @@
 //!
 //! SHEETLIGHT_LONG=1 runs 10,000 rounds instead of 300, and 20 under valgrind.
 
+#![cfg(target_os = "linux")]
+
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use sheetlight::recording::Recording;
