@@ -141,7 +141,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         let (scene, image) = searched(path, args)?;
         let at = |e: Fault| e.at(path.display());
         let cells = template.cells_in(&scene).map_err(at)?;
-        let options = SearchOptions { scales: options.scales.map(|s| s * cells), ..options.clone() };
+        let options = SearchOptions { scales: options.scales.map(|s| s * cells), ..options };
         let matches = find_in(&scene, &template.model, &options, area.as_ref(), accelerator.as_ref()).map_err(at)?;
         if let Some(file) = overlays.get(k) {
             drawn.push((file, draw(&image, &template.model, &matches).to_png()));
