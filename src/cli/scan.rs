@@ -59,9 +59,12 @@ pub struct Args {
     #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
     /// Picture with the laser off at the shots' exposure, subtracted from every shot: a name in the recording, or a
-    /// path
+    /// path; once for each exposure, from the shortest
     #[arg(long)]
-    ambient: Option<PathBuf>,
+    ambient: Vec<PathBuf>,
+    /// Use exposure N of a recording with several, 1 is the shortest, instead of merging all
+    #[arg(long, value_name = "N", conflicts_with_all = ["camera", "raw"])]
+    exposure: Option<usize>,
     /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
     #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
@@ -173,11 +176,14 @@ fn from_recording(
             .cause("another recording, or a motion that is not this one's")
             .next("omit --poses, or correct 'motion' in meta.json"));
     }
-    if let Some(name) = &args.ambient {
+    args.exposure.map(|n| recording.use_exposure(n)).transpose()?;
+    let place = |name: &PathBuf| {
         let inside = folder.join(name);
-        let path = if inside.is_file() { inside } else { name.clone() };
-        options.ambient = Some(recording.load(&path).map_err(no_ambient)?);
-    }
+        if inside.is_file() { inside } else { name.clone() }
+    };
+    let dark: Vec<Image> =
+        args.ambient.iter().map(|name| recording.load(&place(name)).map_err(no_ambient)).collect::<Result<_>>()?;
+    options.ambient = recording.dark(dark)?;
     scan_recording(&recording, args.poses.as_deref(), rig, options, shown_by(bar))
 }
 
@@ -235,7 +241,11 @@ fn seen(folder: &Path, channel: Channel) -> String {
 /// The picture with the laser off that --ambient names; it must have the frames' size.
 fn ambient_beside(args: &Args, f: Format) -> Result<Option<Image>> {
     let load = |path: &PathBuf| load_sized(path, args.channel, f.bits, [f.width, f.height]).map_err(no_ambient);
-    args.ambient.as_ref().map(load).transpose()
+    if args.ambient.len() > 1 {
+        return Err(Fault::usage(format!("{} ambient pictures, the shots have one exposure", args.ambient.len()))
+            .next("give one --ambient"));
+    }
+    args.ambient.first().map(load).transpose()
 }
 
 fn no_ambient(fault: Fault) -> Fault {
@@ -271,6 +281,9 @@ fn summary(r: &ScanReport, out: &Path) -> String {
     }
     if r.hot_pixels > 0 {
         s += &format!("{} hot pixels were replaced by their neighbours\n", r.hot_pixels);
+    }
+    if let Some(exposures) = &r.exposures {
+        s += &format!("{exposures}\n");
     }
     if let Some(p) = &r.places {
         s += &format!("{p}\n");

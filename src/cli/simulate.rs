@@ -69,6 +69,9 @@ pub struct Args {
     /// Peak of the stripe on white as share of full scale, 0.02 to 20 [default: the rig's, 0.95]
     #[arg(long)]
     exposure: Option<f64>,
+    /// Several pictures of each pose of a scan, as --exposure, from the shortest: 0.5,2,8
+    #[arg(long, value_delimiter = ',', value_name = "N,N,...", conflicts_with = "exposure")]
+    exposures: Vec<f64>,
     /// Error of the reported robot poses, 1 sigma per axis, mm
     #[arg(long, value_name = "MM", default_value_t = 0.0)]
     pose_noise_mm: f64,
@@ -126,6 +129,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     options.poses = args.poses.as_deref().map(|path| load_poses(path).map(|read| read.poses)).transpose()?;
     options.sensor.bits = args.bits.unwrap_or(options.sensor.bits);
     options.sensor.laser_white = args.exposure.unwrap_or(options.sensor.laser_white);
+    options.exposures = args.exposures.clone();
     (options.pose_noise_mm, options.pose_noise_deg) = (args.pose_noise_mm, args.pose_noise_deg);
     options = options.with_noise(args.noise);
     options.sensor.speckle = args.speckle.unwrap_or(options.sensor.speckle);

@@ -22,13 +22,14 @@ const MOST: usize = 10_000;
 
 impl HotPixels {
     /// The hot pixels of pictures whose dark pixels scatter by `noise` grey levels of an 8-bit picture. Empty for fewer
-    /// than three pictures: in a single one, a speck of light on the part looks the same.
-    pub fn find(pictures: &[&Image], noise: f32) -> HotPixels {
+    /// than three pictures: in a single one, a speck of light on the part looks the same. `span`: light at the pictures'
+    /// full scale over that of one exposure ([`super::Levels::span`]), 1 for pictures of one exposure.
+    pub fn find(pictures: &[&Image], noise: f32, span: f32) -> HotPixels {
         let Some((first, others)) = pictures.split_first() else { return HotPixels::default() };
         if pictures.len() < PICTURES {
             return HotPixels::default();
         }
-        let over = over(first, noise);
+        let over = over(first, noise, span);
         // Candidates come from two pictures: a stripe that covers a hot pixel in one may leave it free in the other.
         let mut found = standing_out(first, over);
         found.extend(standing_out(others[others.len() - 1], over));
@@ -54,7 +55,7 @@ impl HotPixels {
 
     /// The pixels of one picture that stand out: hot pixels, and specks of light.
     pub fn may_be(image: &Image) -> Vec<[u32; 2]> {
-        standing_out(image, over(image, 0.0))
+        standing_out(image, over(image, 0.0, 1.0))
     }
 
     /// The hot pixels of a stored list, in any order.
@@ -100,8 +101,8 @@ impl HotPixels {
 }
 
 /// Grey levels by which a hot pixel stands out where dark pixels scatter by `noise` levels of an 8-bit picture.
-fn over(image: &Image, noise: f32) -> u32 {
-    let full = f32::from(image.full_scale());
+fn over(image: &Image, noise: f32, span: f32) -> u32 {
+    let full = f32::from(image.full_scale()) / span;
     (SHARE * full).max(SIGMAS * noise * full / 255.0).ceil() as u32
 }
 
@@ -178,15 +179,15 @@ mod tests {
             let hot = [[5, 40], [40, 5], [41, 5], [50, 28], [28, 44]];
             let seen = pictures(&hot, along);
             let all: Vec<&Image> = seen.iter().collect();
-            let found = HotPixels::find(&all, 2.0);
+            let found = HotPixels::find(&all, 2.0, 1.0);
             assert!([[5, 40], [40, 5], [41, 5]].iter().all(|p| found.0.contains(p)), "{found:?}");
             assert!(found.0.iter().all(|p| hot.contains(p)), "{found:?}");
             let mut image = seen[0].clone();
             found.fill(&mut image, along);
             assert!([[5, 40], [40, 5], [41, 5]].iter().all(|p| image.get(p[0], p[1]) < 8));
-            assert!(HotPixels::find(&all[..2], 2.0).0.is_empty(), "two pictures tell nothing");
+            assert!(HotPixels::find(&all[..2], 2.0, 1.0).0.is_empty(), "two pictures tell nothing");
             let none = pictures(&[], along);
-            assert!(HotPixels::find(&none.iter().collect::<Vec<_>>(), 2.0).0.is_empty());
+            assert!(HotPixels::find(&none.iter().collect::<Vec<_>>(), 2.0, 1.0).0.is_empty());
         }
     }
 }

@@ -1,6 +1,7 @@
 //! In: picture files and raw sensor bytes. Out: grey images of 8 to 16 bits, rows without padding.
 //! Frame and unit: pixels, x to the right, y down, (0, 0) is the centre of the top left pixel; grey levels.
 
+mod bracket;
 mod budget;
 pub mod colour;
 mod file;
@@ -15,6 +16,7 @@ mod samples;
 mod size;
 mod text;
 
+pub use bracket::{Bracket, Levels, MERGED_BITS, MOST_EXPOSURES, Shares};
 pub use file::{Channel, Depth, decode, decode_in_part, load, load_in_part, load_sized, png, save_png};
 pub use float::{float_tiff, read_float_tiff};
 pub use hot::HotPixels;

@@ -10,6 +10,9 @@ pub struct FrameRef {
     /// File name of the picture with the laser on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub laser: Option<String>,
+    /// File names of the pictures of the same pose with the longer exposures, in the order of `exposures_us`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub longer: Vec<String>,
     /// File name of the picture with the laser off.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ambient: Option<String>,

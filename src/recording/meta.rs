@@ -5,7 +5,7 @@ use super::frame::FrameRef;
 use super::{BoardSpec, Motion};
 use crate::camera::Readout;
 use crate::fault::{Fault, Result};
-use crate::raster::{MOST_PIXELS, MOST_SIDE, Response};
+use crate::raster::{Bracket, MOST_PIXELS, MOST_SIDE, Response};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -30,6 +30,12 @@ pub struct Meta {
     /// Several boards; frames refer to them by index.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub boards: Vec<BoardSpec>,
+    /// Exposure times of a frame's laser pictures, us, ascending; empty if each frame has one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub exposures_us: Vec<f64>,
+    /// Level without light, for pictures of several exposures.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub black_level: Option<f64>,
     /// The picture with the laser off that a scan may have.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ambient: Option<AmbientRef>,
@@ -120,6 +126,9 @@ impl ImageSpec {
     }
 }
 
+/// Relative difference of two statements of one exposure that is not rounding.
+const OTHER_EXPOSURE: f64 = 0.02;
+
 fn refuse(what: String, next: &str) -> Result<()> {
     Err(Fault::input(what).cause("written by another program or by hand").next(next))
 }
@@ -208,6 +217,7 @@ impl Meta {
             board.check()?;
         }
         self.check_poses()?;
+        self.check_exposures()?;
         match &self.motion {
             Some(motion) => motion.check(&self.frames)?,
             None if self.frames.iter().any(|f| f.count.is_some() || f.trigger.is_some()) => {
@@ -234,6 +244,63 @@ impl Meta {
                     );
                 }
                 _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// The exposures that a frame's pictures are merged from; none if each frame has one picture.
+    ///
+    /// # Errors
+    /// As [`Bracket::new`].
+    pub fn bracket(&self) -> Result<Option<Bracket>> {
+        if self.exposures_us.is_empty() {
+            return Ok(None);
+        }
+        let bits = self.image.response.depth(self.image.bits);
+        Bracket::new(&self.exposures_us, bits, self.black_level.unwrap_or(0.0)).map(Some)
+    }
+
+    /// Refuses frames whose pictures are not those of the stated exposures.
+    fn check_exposures(&self) -> Result<()> {
+        let Some(bracket) = self.bracket()? else {
+            if let Some(i) = self.frames.iter().position(|f| !f.longer.is_empty()) {
+                return refuse(
+                    format!("frame {i} has 'longer' pictures, and their exposures are not stated"),
+                    "state \"exposures_us\": the exposure times of a frame's pictures in microseconds, ascending",
+                );
+            }
+            return match self.black_level {
+                Some(_) => refuse(
+                    "black_level is stated without exposures_us".into(),
+                    "leave it out: it is used only where exposures are merged",
+                ),
+                None => Ok(()),
+            };
+        };
+        let n = bracket.exposures_us().len();
+        let mut names = std::collections::BTreeSet::new();
+        for (i, f) in self.frames.iter().enumerate() {
+            let has = usize::from(f.laser.is_some()) + f.longer.len();
+            if has != n && (f.laser.is_some() || has > 0) {
+                return Err(Fault::input(format!("frame {i} has {has} pictures of its pose, exposures_us states {n}"))
+                    .cause("the picture of an exposure is missing, or one too many is named")
+                    .next(
+                        "name 'laser' (the shortest exposure) and all 'longer' ones in every frame, or take it out",
+                    ));
+            }
+            if let Some(twice) = f.laser.iter().chain(&f.longer).find(|name| !names.insert(name.as_str())) {
+                return refuse(
+                    format!("frame {i}: the picture {twice} stands for two exposures or two poses"),
+                    "give each exposure of each frame its own picture",
+                );
+            }
+            let taken = f.taken.as_ref().and_then(|t| t.exposure_ns).map(|ns| 1e-3 * ns as f64);
+            if let Some(us) = taken.filter(|us| (us / self.exposures_us[0] - 1.0).abs() > OTHER_EXPOSURE) {
+                return refuse(
+                    format!("frame {i} was taken with {us} us, the first of exposures_us is {}", self.exposures_us[0]),
+                    "state what the camera reported",
+                );
             }
         }
         Ok(())

@@ -31,7 +31,7 @@ pub use taken::{Pairing, Slip, Taken};
 
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
-use crate::raster::{Channel, Depth, Image};
+use crate::raster::{Bracket, Channel, Depth, Image, Shares};
 use std::path::{Component, Path, PathBuf};
 
 /// A recording on disk. Pictures are read one at a time, never all at once.
@@ -43,6 +43,8 @@ pub struct Recording {
     pub meta: Meta,
     /// Which channel of colour pictures is used.
     pub channel: Channel,
+    /// The exposure of a bracket that alone is used, counted from 1; none: all.
+    pub exposure: Option<usize>,
     /// Whether files outside the folder may be read. meta.json may come from elsewhere, so the user has to allow it.
     pub outside: bool,
 }
@@ -73,7 +75,8 @@ impl Recording {
                 .next("write meta.json as docs/file-formats.md shows: the picture's size, the board, the frames"));
         }
         let meta = Meta::load(&path)?;
-        let mut recording = Recording { folder: folder.to_owned(), meta, channel: Channel::default(), outside: false };
+        let mut recording =
+            Recording { folder: folder.to_owned(), meta, channel: Channel::default(), exposure: None, outside: false };
         recording
             .read_frames()
             .map_err(|e| if e.what.contains(&*folder.to_string_lossy()) { e } else { e.at(path.display()) })?;
@@ -158,6 +161,53 @@ impl Recording {
         let Some((_, number)) = raw::place(name) else { return self.load(&path) };
         let spec = &self.meta.image;
         Ok(spec.response.linear(raw::load(&path, number, [spec.width, spec.height], spec.bits)?))
+    }
+
+    /// One picture from those of a frame, as [`Bracket::merge`] makes it; the names are in the order of the exposures.
+    pub fn merged(&self, bracket: &Bracket, names: &[String]) -> Result<(Image, Shares)> {
+        let pictures: Vec<Image> = names.iter().map(|name| self.picture(name)).collect::<Result<_>>()?;
+        bracket.merge(&pictures)
+    }
+
+    /// The picture to subtract from the shots, from those that were taken with the laser off, one for each exposure.
+    ///
+    /// # Errors
+    /// Another number of pictures than exposures; as [`Bracket::merge`].
+    pub fn dark(&self, mut pictures: Vec<Image>) -> Result<Option<Image>> {
+        let (n, needed) = (pictures.len(), self.meta.exposures_us.len().max(1));
+        if n > 0 && n != needed {
+            return Err(Fault::usage(format!("{n} ambient pictures, the shots have {needed} exposures"))
+                .cause("light with the laser off is subtracted exposure by exposure")
+                .next("give --ambient once for each exposure, the shortest first, or not at all"));
+        }
+        match self.meta.bracket()? {
+            Some(bracket) if n > 0 => Ok(Some(bracket.merge(&pictures)?.0)),
+            _ => Ok(pictures.pop()),
+        }
+    }
+
+    /// Uses exposure `n` alone, counted from 1, as if the others had not been taken.
+    ///
+    /// # Errors
+    /// A recording of one exposure; fewer exposures than `n`.
+    pub fn use_exposure(&mut self, n: usize) -> Result<()> {
+        let meta = &mut self.meta;
+        let all = meta.exposures_us.len();
+        if !(1..=all).contains(&n) {
+            let at = self.folder.display();
+            let has = if all == 0 { "its frames have one picture each".into() } else { format!("it has {all}") };
+            return Err(Fault::usage(format!("{at}: exposure {n} is wanted, {has}"))
+                .cause("exposures are counted from 1, the shortest; another recording was given")
+                .next("omit --exposure, or name one that meta.json states"));
+        }
+        for frame in &mut meta.frames {
+            let longer = std::mem::take(&mut frame.longer);
+            if let Some(name) = n.checked_sub(2).and_then(|i| longer.into_iter().nth(i)) {
+                frame.laser = Some(name);
+            }
+        }
+        (meta.exposures_us, meta.black_level, self.exposure) = (Vec::new(), None, Some(n));
+        Ok(())
     }
 
     /// The pose of frame `index` among `poses`. Frames that name no pose are paired in order, and then there must be

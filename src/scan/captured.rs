@@ -113,7 +113,7 @@ impl RecordedSource {
         report: Arc<Mutex<Option<Result<RecordReport>>>>,
     ) -> RecordedSource {
         let format = Format { width: meta.image.width, height: meta.image.height, bits: meta.image.bits };
-        let recording = Recording { folder, meta, channel: Default::default(), outside: false };
+        let recording = Recording { folder, meta, channel: Default::default(), exposure: None, outside: false };
         RecordedSource { format, recording, backlog, frames: None, next: 0, report }
     }
 

@@ -179,7 +179,9 @@ impl Engine {
         let step = if few { images.len() / 3 } else { 1 };
         let images: Vec<_> = images.iter().step_by(step).collect();
         let images: Vec<_> = images.par_iter().map(|image| self.lit(image)).collect();
-        let mut noise: Vec<f32> = images.par_iter().map(|image| peak::noise(image)).collect();
+        // Levels of one exposure, as all settings are.
+        let span = self.asked.peak.levels.span;
+        let mut noise: Vec<f32> = images.par_iter().map(|image| span * peak::noise(image)).collect();
         noise.sort_by(f32::total_cmp);
         let noise = *noise.get(noise.len() / 2)?;
         let seen = self.asked.clone().in_noise(noise);
@@ -215,7 +217,7 @@ impl Engine {
         let [read_noise, gain] = [median(|s| s.read_noise.unwrap_or(0.0)), median(|s| s.gain.unwrap_or(0.0))];
         let [grain_px, grain_factor] = [median(|s| s.grain_px)?, median(|s| s.grain_factor)?];
         let stripe = Stripe { width_px, speckle, grain_px, grain_factor, noise, read_noise, gain };
-        let hot = HotPixels::find(&images.iter().map(|i| &**i).collect::<Vec<_>>(), noise);
+        let hot = HotPixels::find(&images.iter().map(|i| &**i).collect::<Vec<_>>(), noise, span);
         Some(StripeSeen { stripe, hot, enough: 2 * telling >= images.len() })
     }
 

@@ -151,12 +151,13 @@ impl Extraction {
     /// The settings that a chain is built from; `scan`, `bench` and the peers use the same. Ends of lines are
     /// extended by multiples of `width_px`.
     pub fn chain(&self, format: Format, optics: Optics, width_px: f32) -> ChainConfig {
-        let shift = format.bits - 8;
         let ThresholdParams { offset, minimum, .. } = self.threshold;
-        // The settings are grey levels of 8 bits; they are scaled to the pictures' depth.
+        // The settings are grey levels of 8 bits of one exposure; they are scaled to the pictures' depth, and to how
+        // much more light their full scale holds.
+        let level = f32::from(1u16 << (format.bits - 8)) / self.peak.levels.span;
         let threshold = ThresholdParams {
-            offset: offset << shift,
-            minimum: ((u32::from(minimum) << shift).min(0xffff)) as u16,
+            offset: (offset as f32 * level).round() as i32,
+            minimum: (f32::from(minimum) * level).round().min(65535.0) as u16,
             ..self.threshold
         };
         let company = if self.company { spacing::COMPANY } else { 0 };

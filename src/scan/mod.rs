@@ -43,4 +43,4 @@ pub use scanner::{Profile, Scanner};
 pub use shift::plateau::Plateau;
 pub use shift::scan::{ShiftReport, ShiftRig, Side, shift_scan};
 pub use shots::{Along, SHOTS_FILE, Shots, ShotsWriter};
-pub use source::{BadShot, RawSource, RecordingSource, Shot, Source};
+pub use source::{BadShot, Merged, RawSource, RecordingSource, Shot, Source};

@@ -7,12 +7,13 @@ use crate::camera::Readout;
 use crate::capture::{Account, Format, Latency, Pictures, RawFormat, RawFrames};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
-use crate::raster::Image;
+use crate::raster::{Bracket, Image, Levels, MERGED_BITS, Shares};
 use crate::recording::{FrameRef, Meta, Pairing, Recording, Slip, Stand};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::io::Read;
 use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// A picture of the stripe, with the position of the robot or the axis when it was taken.
 #[derive(Clone, Debug)]
@@ -44,6 +45,38 @@ pub struct BadShot {
     pub last: bool,
 }
 
+/// The exposures that shots were merged from.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Merged {
+    /// Exposure times of the pictures of a shot, us, ascending.
+    pub exposures_us: Vec<f64>,
+    /// Number of pictures that were merged.
+    pub pictures: u64,
+    /// Share of the lit pixels that each exposure gave: it is the longest that was not saturated there.
+    pub shares: Vec<f64>,
+    /// Share of the lit pixels that are saturated even in the shortest exposure.
+    pub saturated: f64,
+}
+
+impl std::fmt::Display for Merged {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let list = |values: &[f64], places: usize| {
+            values.iter().map(|v| format!("{v:.places$}")).collect::<Vec<_>>().join(", ")
+        };
+        let percent: Vec<f64> = self.shares.iter().map(|s| 100.0 * s).collect();
+        write!(
+            f,
+            "{} pictures with exposures of {} us were merged; these gave {} % of the lit pixels, {:.2} % are saturated \
+             in all",
+            self.pictures,
+            list(&self.exposures_us, 1),
+            list(&percent, 2),
+            100.0 * self.saturated
+        )
+    }
+}
+
 /// Where shots come from: a folder, a pipe, a camera.
 pub trait Source {
     /// Size and depth of all its shots.
@@ -59,6 +92,14 @@ pub trait Source {
     /// Whether the source can be opened again at the position where it was left.
     fn resumable(&self) -> bool {
         true
+    }
+    /// The exposures that its shots were merged from so far, if they are merged.
+    fn merged(&self) -> Option<Merged> {
+        None
+    }
+    /// The levels of its shots in terms of one exposure's.
+    fn levels(&self) -> Levels {
+        Levels::default()
     }
     /// What became of every picture that its camera sent, if it has a camera.
     fn account(&self) -> Option<Account> {
@@ -77,6 +118,7 @@ const AHEAD_BYTES: usize = 100 << 20;
 /// A recording folder as a source.
 pub struct RecordingSource {
     pictures: Pictures,
+    merging: Option<Merging>,
     remarks: Vec<String>,
     remaining: usize,
     shots: Receiver<std::result::Result<Shot, BadShot>>,
@@ -87,14 +129,41 @@ fn by_clock(meta: &Meta) -> bool {
     meta.frames.iter().flat_map(|f| &f.taken).any(|t| t.pairing == Some(Pairing::Clock))
 }
 
-/// Index and name of a picture, the position at its exposure, and how far that may be off.
-type Job = (u32, String, Result<Stand>, Option<Slip>);
+/// The exposures to merge, and what became of the pixels of the shots so far.
+#[derive(Clone)]
+struct Merging {
+    bracket: Arc<Bracket>,
+    so_far: Arc<Mutex<(u64, Shares)>>,
+}
+
+impl Merging {
+    /// The shot of these pictures.
+    fn shot(&self, recording: &Recording, names: &[String]) -> Result<Image> {
+        let (image, shares) = recording.merged(&self.bracket, names)?;
+        let mut so_far = self.so_far.lock().unwrap_or_else(PoisonError::into_inner);
+        so_far.0 += names.len() as u64;
+        so_far.1.add(&shares);
+        Ok(image)
+    }
+
+    fn report(&self) -> Merged {
+        let (pictures, shares) = *self.so_far.lock().unwrap_or_else(PoisonError::into_inner);
+        let share = |n: u64| n as f64 / shares.lit().max(1) as f64;
+        let exposures_us = self.bracket.exposures_us().to_vec();
+        let by_exposure = shares.by_exposure[..exposures_us.len()].iter().map(|n| share(*n)).collect();
+        Merged { exposures_us, pictures, shares: by_exposure, saturated: share(shares.saturated) }
+    }
+}
+
+/// Index of a shot, the names of its pictures, the position at its exposure, and how far that may be off.
+type Job = (u32, Vec<String>, Result<Stand>, Option<Slip>);
 
 /// The shots in order, decoded on another thread as far ahead as memory allows.
 fn ahead(
     recording: Recording,
     jobs: Vec<Job>,
     format: &Format,
+    merging: Option<Merging>,
 ) -> Result<Receiver<std::result::Result<Shot, BadShot>>> {
     let bytes = format.width as usize * format.height as usize * if format.bits > 8 { 2 } else { 1 };
     let ahead = (AHEAD_BYTES / bytes.max(1)).clamp(8, 64);
@@ -103,9 +172,13 @@ fn ahead(
         for chunk in jobs.chunks((ahead / 2).max(rayon::current_num_threads())) {
             let decoded: Vec<_> = chunk
                 .par_iter()
-                .map(|(index, name, stand, slip)| {
-                    let (index, name, slip) = (*index, name.clone(), *slip);
-                    let shot = stand.clone().and_then(|s| Ok((s, recording.picture(&name)?)));
+                .map(|(index, names, stand, slip)| {
+                    let (index, name, slip) = (*index, names[0].clone(), *slip);
+                    let picture = || match &merging {
+                        Some(merging) => merging.shot(&recording, names),
+                        None => recording.picture(&name),
+                    };
+                    let shot = stand.clone().and_then(|s| Ok((s, picture()?)));
                     match shot {
                         Ok((stand, image)) => Ok(Shot { index, name, image, stand, slip, here_ns: None }),
                         Err(fault) => Err(BadShot { index, name, fault, last: false }),
@@ -157,25 +230,32 @@ impl RecordingSource {
             }
         }
         let mut jobs: Vec<Job> = Vec::new();
-        for (name, stand, slip) in stands {
-            recording.inside(&name)?;
-            jobs.push((jobs.len() as u32, name, stand, slip));
+        for (names, stand, slip) in stands {
+            names.iter().try_for_each(|name| recording.inside(name).map(|_| ()))?;
+            jobs.push((jobs.len() as u32, names, stand, slip));
         }
         let jobs = jobs.split_off(first.min(jobs.len()));
-        let format = Format { width: meta.image.width, height: meta.image.height, bits: recording.bits() };
+        let merging = meta.bracket()?.map(|b| Merging { bracket: Arc::new(b), so_far: Default::default() });
+        let bits = if merging.is_some() { MERGED_BITS } else { recording.bits() };
+        let format = Format { width: meta.image.width, height: meta.image.height, bits };
         let remaining = jobs.len();
-        let shots = ahead(recording.clone(), jobs, &format)?;
+        let shots = ahead(recording.clone(), jobs, &format, merging.clone())?;
         let remarks = meta.image.response.remark(meta.image.bits).into_iter().collect();
         let pictures = Pictures { format, readout: meta.image.readout };
-        Ok(RecordingSource { pictures, remarks, remaining, shots })
+        Ok(RecordingSource { pictures, merging, remarks, remaining, shots })
     }
 }
 
-/// A picture's name, the position at its exposure, and how far that may be off.
-type Stood = (String, Result<Stand>, Option<Slip>);
+/// The names of a shot's pictures, the position at its exposure, and how far that may be off.
+type Stood = (Vec<String>, Result<Stand>, Option<Slip>);
 
 fn slip_of(frame: &FrameRef) -> Option<Slip> {
     frame.taken.as_ref()?.slip()
+}
+
+/// The names of a frame's laser pictures, the shortest exposure first.
+fn pictures_of(frame: &FrameRef) -> Vec<String> {
+    frame.laser.iter().chain(&frame.longer).cloned().collect()
 }
 
 /// Pictures with the laser on and their robot poses.
@@ -196,7 +276,8 @@ fn posed(recording: &Recording, poses: Option<&str>) -> Result<Vec<Stood>> {
             .cause("the pose file was cut short, or belongs to another recording")
             .next("record the poses again, or remove the frames without poses from meta.json"));
         };
-        Ok((name.clone(), Ok(Stand::Robot(*base_from_flange)), slip_of(&recording.meta.frames[i])))
+        let frame = &recording.meta.frames[i];
+        Ok((pictures_of(frame), Ok(Stand::Robot(*base_from_flange)), slip_of(frame)))
     };
     frames.filter_map(|(i, f)| Some((i, f.laser.as_ref()?, f.pose))).map(stand).collect()
 }
@@ -212,7 +293,8 @@ fn counted(recording: &Recording) -> Result<Vec<Stood>> {
                 .cause("the encoder's reading was lost")
                 .next("add its count to the recording, or exclude the shot with --skip-bad")
         };
-        (name.clone(), count.map(Stand::Count).ok_or_else(unknown), slip_of(&recording.meta.frames[i]))
+        let frame = &recording.meta.frames[i];
+        (pictures_of(frame), count.map(Stand::Count).ok_or_else(unknown), slip_of(frame))
     };
     Ok(frames.filter_map(|(i, (f, count))| Some((i, (f.laser.as_ref()?, count)))).map(stand).collect())
 }
@@ -231,6 +313,12 @@ impl Source for RecordingSource {
         let shot = self.shots.recv().ok()?;
         self.remaining -= 1;
         Some(shot)
+    }
+    fn merged(&self) -> Option<Merged> {
+        Some(self.merging.as_ref()?.report())
+    }
+    fn levels(&self) -> Levels {
+        self.merging.as_ref().map_or_else(Levels::default, |m| m.bracket.levels())
     }
     fn remarks(&self) -> Vec<String> {
         self.remarks.clone()

@@ -71,6 +71,9 @@ pub struct SimulateOptions {
     pub height: u32,
     /// Conversion of light into grey levels.
     pub sensor: Sensor,
+    /// Exposures of each pose of a scan, ascending, as peaks of the stripe on white (share of full scale, 0.002..=200).
+    /// Empty: one picture a pose, with the sensor's own.
+    pub exposures: Vec<f64>,
     /// Shots of a scan, 2..=100000.
     pub shots: usize,
     /// The axis that moves the parts past the fixed sensor; `None`: a robot moves the sensor.
@@ -100,6 +103,7 @@ impl SimulateOptions {
             width: rig.camera.width_px,
             height: rig.camera.height_px,
             sensor: rig.sensor,
+            exposures: Vec::new(),
             shots: rig.shots(),
             motion: None,
             poses: None,
@@ -120,6 +124,14 @@ impl SimulateOptions {
             ("pose noise in degrees", self.pose_noise_deg, 0.0, 5.0),
             ("the number of sets", self.sets.len() as f64, 1.0, 100.0),
         ];
+        if let Some(odd) = self.exposures.iter().find(|e| !(0.002..=200.0).contains(*e)) {
+            return Err(Fault::usage(format!("an exposure of {odd}, allowed 0.002..=200"))
+                .next("give peaks of the stripe on white as shares of full scale"));
+        }
+        if !self.exposures.is_empty() {
+            crate::raster::Bracket::new(&self.exposures_us(), self.sensor.bits, 0.0)
+                .map_err(|e| e.at("--exposures"))?;
+        }
         if self.motion.is_none() && self.sets.contains(&Set::Axis) {
             return Err(Fault::usage("the set axis shows a board on an axis, and no axis is simulated")
                 .next("name one: --motion linear or --motion turntable"));
@@ -134,6 +146,11 @@ impl SimulateOptions {
             }
             None => Ok(()),
         }
+    }
+
+    /// The exposure times of a pose's pictures, us: the sensor's own levels are those of a millisecond.
+    pub fn exposures_us(&self) -> Vec<f64> {
+        self.exposures.iter().map(|peak| 1000.0 * peak / self.sensor.laser_white).collect()
     }
 
     /// The design: the named rig, or the paper's.

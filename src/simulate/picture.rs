@@ -153,10 +153,20 @@ pub fn expose(
     hot: &[(usize, f32)],
     rng: &mut Pcg64,
 ) -> Image {
+    let light = fallen(sensor, laser, room, room_gain, hot, rng);
+    read(sensor, &light, 1.0, rng)
+}
+
+/// The light that falls on the sensor, with its speckle and with what its hot pixels add.
+pub(super) fn fallen(
+    sensor: &Sensor,
+    laser: &Canvas,
+    room: &Canvas,
+    room_gain: f32,
+    hot: &[(usize, f32)],
+    rng: &mut Pcg64,
+) -> Canvas {
     let speckle = (sensor.speckle > FAINTEST_SPECKLE).then(|| Speckle::new(sensor, (laser.width, laser.height), rng));
-    let well = sensor.full_well_e as f32;
-    let read = (sensor.read_noise_e * sensor.read_noise_e) as f32;
-    let full = ((1u32 << sensor.bits) - 1) as f32;
     let mut light: Vec<f32> = laser
         .pixels
         .iter()
@@ -168,15 +178,23 @@ pub fn expose(
         })
         .collect();
     hot.iter().for_each(|&(i, extra)| light[i] += extra);
-    let mut grey = |l: f32| {
-        let electrons = l * well;
+    Canvas { pixels: light, ..Canvas::new(laser.width, laser.height) }
+}
+
+/// Grey levels of light that falls on the sensor `times` as long as its levels are stated for.
+pub(super) fn read(sensor: &Sensor, light: &Canvas, times: f32, rng: &mut Pcg64) -> Image {
+    let well = sensor.full_well_e as f32;
+    let read = (sensor.read_noise_e * sensor.read_noise_e) as f32;
+    let full = ((1u32 << sensor.bits) - 1) as f32;
+    let mut grey = |l: &f32| {
+        let electrons = times * l * well;
         let noise: f32 = StandardNormal.sample(rng);
         ((electrons + noise * (electrons + read).sqrt()) / well * full + 0.5).clamp(0.0, full)
     };
     if sensor.bits == 8 {
-        Image::from_u8(laser.width, laser.height, light.into_iter().map(|l| grey(l) as u8).collect())
+        Image::from_u8(light.width, light.height, light.pixels.iter().map(|l| grey(l) as u8).collect())
     } else {
-        Image::from_u16(laser.width, laser.height, sensor.bits, light.into_iter().map(|l| grey(l) as u16).collect())
+        Image::from_u16(light.width, light.height, sensor.bits, light.pixels.iter().map(|l| grey(l) as u16).collect())
     }
 }
 

@@ -24,12 +24,6 @@ pub(super) struct Shot {
     pub board: Option<usize>,
 }
 
-impl Shot {
-    pub fn pictures(&self) -> usize {
-        usize::from(self.laser.is_some()) + usize::from(self.ambient)
-    }
-}
-
 /// The shots of one set.
 pub(super) struct Plan {
     pub set: Set,
@@ -42,6 +36,8 @@ pub(super) struct Plan {
     pub counts: Vec<f64>,
     pub truth: TruthFile,
     pub motion: Option<Motion>,
+    /// Exposure times of the laser pictures of each shot, us; empty: one picture a shot.
+    pub exposures_us: Vec<f64>,
 }
 
 /// The board that rides on an axis if no other is named. It is small enough to be in the picture along some of the
@@ -62,6 +58,12 @@ pub fn scene_from_board() -> Rigid<InScene, Board> {
 }
 
 impl Plan {
+    /// Number of pictures of all shots.
+    pub fn pictures(&self) -> usize {
+        let exposures = self.exposures_us.len().max(1);
+        self.shots.iter().map(|s| exposures * usize::from(s.laser.is_some()) + usize::from(s.ambient)).sum()
+    }
+
     /// `ride` moves the scanned part in [`Set::Scan`] and [`Set::Axis`]; [`Set::Axis`] requires it.
     pub fn new(
         set: Set,
@@ -72,7 +74,11 @@ impl Plan {
     ) -> Result<Plan> {
         let truth = TruthFile::of(station, set.name());
         let (scenes, boards, shots, poses, counts) = (vec![], vec![], vec![], vec![], vec![]);
-        let mut plan = Plan { set, scenes, boards, shots, poses, counts, truth, motion: None };
+        let mut plan =
+            Plan { set, scenes, boards, shots, poses, counts, truth, motion: None, exposures_us: Vec::new() };
+        if set == Set::Scan {
+            plan.exposures_us = options.exposures_us();
+        }
         match (set, ride) {
             (Set::Scan | Set::Axis, Some((ride, board))) => plan.ride(station, scene, ride, board)?,
             (Set::Axis, None) => unreachable!("refused without an axis"),

@@ -4,7 +4,7 @@
 
 use super::light::{Canvas, View};
 use super::options::{DEFAULT_SCENE, Set, SimulateOptions};
-use super::picture::expose;
+use super::picture::{expose, fallen, read};
 use super::plan;
 use super::ride::Ride;
 use super::scene::{Scene, SceneSpec};
@@ -12,7 +12,7 @@ use super::sets::{Plan, Shot, riding_board};
 use super::station::{Station, TRUE_VALUES};
 use crate::fault::{Fault, Result};
 use crate::geometry::{AxisKind, Vec3};
-use crate::raster::{Image, save_png};
+use crate::raster::{Image, MOST_EXPOSURES, save_png};
 use crate::recording::{AmbientRef, Beam, FrameRef, ImageSpec, Meta, save_poses};
 use crate::rig::{Calibration, Covariance, Kind, Quality, Rig, Verdict};
 use rayon::prelude::*;
@@ -55,7 +55,7 @@ pub fn simulate(out: &Path, options: &SimulateOptions, progress: &(dyn Fn(usize,
         .iter()
         .map(|set| Plan::new(*set, &station, &scene, options, ride.as_ref()))
         .collect::<Result<_>>()?;
-    let total = plans.iter().map(|p| p.shots.iter().map(Shot::pictures).sum::<usize>()).sum();
+    let total = plans.iter().map(Plan::pictures).sum();
     let done = std::sync::atomic::AtomicUsize::new(0);
     let count = || progress(1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed), total);
     let mut recordings = Vec::new();
@@ -86,12 +86,18 @@ fn store_axis(ride: &Ride, station: &Path) -> Result<()> {
     Rig::store(station, &Calibration::new(kind, ride.axis, camera.as_ref(), covariance, quality), None).map(|_| ())
 }
 
+/// Name of a shot's picture at exposure `k`, counted from the shortest.
+fn laser_name(shot: usize, k: usize) -> String {
+    if k == 0 { format!("laser_{shot:04}.png") } else { format!("laser_{shot:04}_{}.png", k + 1) }
+}
+
 impl Plan {
     /// The entry of one shot in meta.json.
     fn frame(&self, i: usize) -> FrameRef {
         let shot = &self.shots[i];
         FrameRef {
-            laser: shot.laser.map(|_| format!("laser_{i:04}.png")),
+            laser: shot.laser.map(|_| laser_name(i, 0)),
+            longer: (1..self.exposures_us.len()).map(|k| laser_name(i, k)).collect(),
             ambient: (shot.ambient && self.set != Set::Scan).then(|| format!("ambient_{i:04}.png")),
             pose: self.pose(i),
             board: shot.board,
@@ -127,6 +133,8 @@ impl Plan {
             boards: if single { vec![] } else { self.boards.clone() },
             ambient: ambient.map(|i| AmbientRef { file: "ambient.png".into(), pose: self.pose(i) }),
             frames: (0..self.shots.len()).map(|i| self.frame(i)).collect(),
+            exposures_us: self.exposures_us.clone(),
+            black_level: None,
             frames_file: None,
             sources: None,
             motion: self.motion.clone(),
@@ -199,7 +207,7 @@ impl Plan {
         let json = |value: serde_json::Result<String>| value.expect("plain data").into_bytes();
         crate::files::write(&folder.join("truth.json"), &json(serde_json::to_string_pretty(&truth)))?;
         crate::files::write(&meta, &json(serde_json::to_string_pretty(&self.meta(station))))?;
-        Ok(self.shots.iter().map(Shot::pictures).sum())
+        Ok(self.pictures())
     }
 
     /// Takes one shot's pictures; returns the points on the stripe that are bright enough to be measured.
@@ -232,13 +240,21 @@ impl Plan {
         };
         let room = if sensor.ambient_leak > 0.0 { view.faint_ambient() } else { Canvas::new(w, h) };
         let mut rng = station.rng(self.set.name(), 2 * i as u64 + 1);
-        let picture = expose(sensor, &light, &room, sensor.ambient_leak as f32, hot, &mut rng);
-        save(format!("laser_{i:04}.png"), picture)?;
+        let fallen = fallen(sensor, &light, &room, sensor.ambient_leak as f32, hot, &mut rng);
+        if self.exposures_us.is_empty() {
+            save(laser_name(i, 0), read(sensor, &fallen, 1.0, &mut rng))?;
+        }
+        // The speckle of a pose is the same in all of its pictures; the sensor's noise is not.
+        for (k, us) in self.exposures_us.iter().enumerate() {
+            let mut rng = station.rng("exposures", (MOST_EXPOSURES * i + k) as u64);
+            save(laser_name(i, k), read(sensor, &fallen, (1e-3 * us) as f32, &mut rng))?;
+        }
+        let longest = self.exposures_us.last().map_or(1.0, |us| (1e-3 * us) as f32);
         let bright = |u: f64, v: f64| {
             let (x, y) = (u.round(), v.round());
             let inside = x >= 0.0 && y >= 0.0 && x < f64::from(w) && y < f64::from(h);
             // 6 % of full scale: about 15 of 255 grey levels.
-            inside && light.pixels[y as usize * w as usize + x as usize] > 0.06
+            inside && longest * light.pixels[y as usize * w as usize + x as usize] > 0.06
         };
         Ok(middle.iter().filter(|p| bright(p.u, p.v)).map(|p| p.point).collect())
     }

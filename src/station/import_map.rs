@@ -102,6 +102,7 @@ fn report(made: Lines, points: u64, imported: Imported) -> ScanReport {
         seen: Seen::default(),
         peaks: BTreeMap::new(),
         dark_shots: vec![],
+        exposures: None,
         camera: None,
         delay: None,
         skipped: vec![],

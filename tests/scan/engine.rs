@@ -49,6 +49,7 @@ fn gpu_and_twins_give_the_same_points() {
     }
     agree("640x480", &["--shots", "40"]);
     agree("641x479", &["--shots", "21", "--width", "641", "--height", "479", "--seed", "3"]);
+    agree("three exposures", &["--shots", "20", "--exposures", "0.2,1,5", "--seed", "3"]);
     agree("12 bits", &["--shots", "20", "--bits", "12", "--seed", "5"]);
 }
 

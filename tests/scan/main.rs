@@ -7,6 +7,7 @@ mod common;
 
 mod axis;
 mod bad_input;
+mod brackets;
 mod chain;
 mod clouds;
 mod cramer_rao;

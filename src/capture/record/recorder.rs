@@ -243,6 +243,8 @@ fn meta(format: Format, options: &RecorderOptions) -> Meta {
         boards: vec![],
         ambient: None,
         frames: vec![],
+        exposures_us: Vec::new(),
+        black_level: None,
         frames_file: Some(FRAMES.into()),
         sources: options.sources.clone(),
         motion: options.motion.clone(),

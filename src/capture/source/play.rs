@@ -38,6 +38,12 @@ impl Player {
     /// No recording, or one without laser pictures.
     pub fn open(folder: &Path, rate_hz: f64, loops: u64) -> Result<Player> {
         let recording = Recording::open(folder)?;
+        if !recording.meta.exposures_us.is_empty() {
+            let n = recording.meta.exposures_us.len();
+            return Err(Fault::input(format!("{}: each pose has {n} pictures, a camera sends one", folder.display()))
+                .cause("a recording of several exposures")
+                .next("scan it instead: sheetlight scan merges them"));
+        }
         let stands = stands(&recording);
         let frames = recording.meta.frames.iter().zip(stands);
         let names: Vec<_> = frames.filter_map(|(f, s)| Some((f.laser.clone()?, s))).collect();

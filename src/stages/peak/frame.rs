@@ -134,7 +134,8 @@ impl PeakFrame {
         across: Vec2,
     ) -> PeakFrame {
         let full_scale = ((1u32 << bits) - 1) as f32;
-        let scale = full_scale / 255.0;
+        // Levels of the pictures in one of an 8-bit picture of one exposure.
+        let scale = full_scale / 255.0 / p.levels.span;
         let s0 = p.width_px;
         // A window whose middle lies between two pixels contains at least one of them.
         let radius = if p.along > 0.0 { (2.4 * p.along * s0).max(1.0) } else { 0.0 };

@@ -78,7 +78,7 @@ fn look<G: Grey>(
     }
     let factor = if more.is_empty() { 1.0 } else { median(more).max(1.0).sqrt() };
     let sums: Vec<Sums> = fits.iter().map(|f| f.sums).collect();
-    let found = Scatter::fit(&sums, &Scatter::of(p), s.full_scale);
+    let found = Scatter::fit(&sums, &Scatter::of(p), s.full_scale / p.levels.span);
     Some(Stripe {
         width_px: width_px.clamp(0.4, 12.0),
         speckle: found.speckle,

@@ -2,6 +2,7 @@
 //! field.
 
 use crate::fault::{Fault, Result};
+use crate::raster::Levels;
 
 /// Method for finding the centre across the stripe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -40,6 +41,10 @@ pub struct PeakParams {
     /// measured on the first shots.
     #[serde(skip, default = "one")]
     pub grain: f32,
+    /// The pictures' levels in terms of those of one exposure, which all levels here are. Not a setting: it follows from
+    /// the exposures that the pictures were merged from.
+    #[serde(skip)]
+    pub levels: Levels,
     /// Read and quantisation noise, 0.1..=20 grey levels of an 8-bit picture.
     pub read_noise: f32,
     /// Shot noise: grey levels (8-bit) per photo-electron, 0..=5; its variance is this times the level.
@@ -58,6 +63,7 @@ impl Default for PeakParams {
             width_px: 0.75,
             speckle: 0.18,
             grain: 1.0,
+            levels: Levels::default(),
             read_noise: 0.7,
             gain: 0.05,
             along: 1.0,

@@ -44,15 +44,10 @@ pub fn calibrate_latency(
     let (rates, former_ns) = pairing(recording)?;
     let mut source = RecordingSource::open(recording, None, 0)?;
     let (volume, total) = (believed(settings, rig), source.remaining());
-    let mut scanner = Scanner::new(
-        rig,
-        carrier.clone(),
-        source.pictures(),
-        &settings.extraction,
-        volume.as_ref(),
-        None,
-        place.open()?,
-    )?;
+    let mut extraction = settings.extraction.clone();
+    extraction.peak.levels = source.levels();
+    let mut scanner =
+        Scanner::new(rig, carrier.clone(), source.pictures(), &extraction, volume.as_ref(), None, place.open()?)?;
     let mut stands: BTreeMap<u32, Stand> = BTreeMap::new();
     let mut shots = Vec::new();
     let mut add = |profiles: Vec<crate::scan::Profile>, stands: &BTreeMap<u32, Stand>| -> Result<()> {

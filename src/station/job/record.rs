@@ -43,6 +43,8 @@ impl Record {
             boards: vec![],
             ambient: None,
             frames: vec![],
+            exposures_us: Vec::new(),
+            black_level: None,
             frames_file: None,
             sources: None,
             motion: None,

@@ -8,7 +8,7 @@ use super::seen::Seen;
 use crate::capture::Delay;
 use crate::fault::Result;
 use crate::rig::{Rig, Volume};
-use crate::scan::{Carrier, Pictures, Processor, Scanner, Source, needs};
+use crate::scan::{Carrier, Processor, Scanner, Source, needs};
 use std::collections::BTreeMap;
 
 /// Data of a scan after its last shot.
@@ -61,6 +61,7 @@ impl Done<'_> {
             seen: self.seen,
             peaks: state.peaks,
             dark_shots: state.dark,
+            exposures: self.source.merged(),
             camera: self.source.account(),
             delay: self.delay,
             skipped: state.skipped,
@@ -87,14 +88,16 @@ impl Done<'_> {
 /// The scanner for such pictures, and the collector of their levels.
 pub(super) fn scanner_for(
     rig: &Rig,
-    pictures: Pictures,
+    source: &dyn Source,
     options: &ScanOptions,
     processor: Processor,
 ) -> Result<(Scanner, Seen)> {
     let (volume, ambient) = (options.volume.as_ref(), options.ambient.clone());
     rig.need_all(&needs(&options.motion))?;
     let carrier = Carrier::new(rig, &options.motion)?;
-    let scanner = Scanner::new(rig, carrier, pictures, &options.extraction, volume, ambient, processor)?;
+    let (pictures, mut extraction) = (source.pictures(), options.extraction.clone());
+    extraction.peak.levels = source.levels();
+    let scanner = Scanner::new(rig, carrier, pictures, &extraction, volume, ambient, processor)?;
     let camera = rig.need_camera()?.for_pictures(pictures.size(), pictures.readout.as_ref())?;
     let seen = Seen::new(&camera, &rig.need_laser_plane()?.value, Volume::depths(volume));
     Ok((scanner, seen))

@@ -76,7 +76,7 @@ pub fn scan_held(
     let rig = &parts_for(rig, &options.motion);
     rig.belong_together()?;
     rig.reaches(options.volume.as_ref())?;
-    let (mut scanner, mut seen) = scanner_for(rig, source.pictures(), options, options.place.open()?)?;
+    let (mut scanner, mut seen) = scanner_for(rig, &*source, options, options.place.open()?)?;
     let total = source.remaining();
     let (mut state, mut gathered, mut ended) = (Checkpoint::new(String::new()), Gathered::default(), false);
     while !ended {

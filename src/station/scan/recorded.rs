@@ -63,6 +63,8 @@ fn identity(recording: &Recording, poses: Option<&str>, ambient: Option<&Image>)
     if let Some(name) = &recording.meta.frames_file {
         meta += &hash_file(&recording.inside(name)?)?;
     }
+    // One exposure of a bracket is another recording than all of them.
+    meta += &recording.exposure.map_or(String::new(), |n| format!("exposure {n}"));
     // The readout may also be stated by a person.
     meta += &recording.meta.image.readout.map_or(String::new(), |r| r.to_string());
     let ambient = ambient.map(|image| match &image.pixels {

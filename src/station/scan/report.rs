@@ -8,7 +8,8 @@ use crate::fault::{Fault, Result};
 use crate::recording::Motion;
 use crate::rig::{Volume, hash_file};
 use crate::scan::{
-    Along, CloudFile, CloudPoint, Extraction, Filter, Format, PathFound, SHOTS_FILE, SheetFound, Shots, read_cloud,
+    Along, CloudFile, CloudPoint, Extraction, Filter, Format, Merged, PathFound, SHOTS_FILE, SheetFound, Shots,
+    read_cloud,
 };
 use crate::stages::peak::Stripe;
 use rayon::prelude::*;
@@ -50,6 +51,9 @@ pub struct ScanReport {
     pub peaks: BTreeMap<String, u64>,
     /// Shots without a single kept peak.
     pub dark_shots: Vec<u32>,
+    /// The exposures that the shots were merged from, and the share of each; `None` for shots of one picture.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposures: Option<Merged>,
     /// Account of every picture that a camera sent; `None` without a camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<Account>,

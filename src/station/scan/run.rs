@@ -153,7 +153,7 @@ impl<'a> Work<'a> {
             CloudWriter::create_in(&cloud_path, options.motion.frame())?
         };
         let total = source.remaining().map(|n| n + first - repeated);
-        let (scanner, seen) = scanner_for(rig, source.pictures(), options, processor)?;
+        let (scanner, seen) = scanner_for(rig, source, options, processor)?;
         let scanner = scanner.resumed(state.stripe, state.hot.clone(), state.first_place());
         let print = rig.fingerprint();
         let shots = if resumed {

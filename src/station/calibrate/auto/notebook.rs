@@ -130,6 +130,8 @@ impl Notebook {
             motion: None,
             pose_file: Some("poses".into()),
             pose_files: Default::default(),
+            exposures_us: Vec::new(),
+            black_level: None,
             frames_file: None,
             sources: None,
             part: None,
@@ -153,7 +155,13 @@ impl Notebook {
     pub fn recordings(&self) -> Vec<Recording> {
         let open = |(name, beam): (&str, Beam)| {
             let folder = self.folder.join(name);
-            Some(Recording { folder, meta: self.meta(beam)?, channel: Channel::default(), outside: false })
+            Some(Recording {
+                folder,
+                meta: self.meta(beam)?,
+                channel: Channel::default(),
+                exposure: None,
+                outside: false,
+            })
         };
         NAMES.into_iter().filter_map(open).collect()
     }
