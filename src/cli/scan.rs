@@ -58,12 +58,11 @@ pub struct Args {
     /// Channel of a colour picture: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
-    /// Picture with the laser off at the shots' exposure, subtracted from every shot: a name in the recording, or a
-    /// path; once for each exposure, from the shortest
+    /// Picture with the laser off at the shots' exposure, to subtract: in the recording, or a path; once per exposure
     #[arg(long)]
     ambient: Vec<PathBuf>,
     /// Use exposure N of a recording with several, 1 is the shortest, instead of merging all
-    #[arg(long, value_name = "N", conflicts_with_all = ["camera", "raw"])]
+    #[arg(long, value_name = "N", hide_short_help = true, conflicts_with_all = ["camera", "raw"])]
     exposure: Option<usize>,
     /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
     #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]

@@ -22,8 +22,8 @@ const MOST: usize = 10_000;
 
 impl HotPixels {
     /// The hot pixels of pictures whose dark pixels scatter by `noise` grey levels of an 8-bit picture. Empty for fewer
-    /// than three pictures: in a single one, a speck of light on the part looks the same. `span`: light at the pictures'
-    /// full scale over that of one exposure ([`super::Levels::span`]), 1 for pictures of one exposure.
+    /// than three pictures: in a single one, a speck of light on the part looks the same. `span`: light at full scale
+    /// of the pictures over that of one exposure ([`super::Levels::span`]), 1 for pictures of one exposure.
     pub fn find(pictures: &[&Image], noise: f32, span: f32) -> HotPixels {
         let Some((first, others)) = pictures.split_first() else { return HotPixels::default() };
         if pictures.len() < PICTURES {

@@ -41,8 +41,8 @@ pub struct PeakParams {
     /// measured on the first shots.
     #[serde(skip, default = "one")]
     pub grain: f32,
-    /// The pictures' levels in terms of those of one exposure, which all levels here are. Not a setting: it follows from
-    /// the exposures that the pictures were merged from.
+    /// The pictures' levels in terms of those of one exposure, which all levels here are. Not a setting: it follows
+    /// from the exposures that the pictures were merged from.
     #[serde(skip)]
     pub levels: Levels,
     /// Read and quantisation noise, 0.1..=20 grey levels of an 8-bit picture.
