@@ -143,8 +143,7 @@ impl Bracket {
             let squares = bracket.power(k, 2);
             let mut all = 0.0;
             for (i, t) in exposures_us[..=k].iter().enumerate() {
-                // Rounded down, so that no sum exceeds 32 bits.
-                let weight = (one * unit * exposures_us[n - 1] * t / squares).floor();
+                let weight = (one * unit * exposures_us[n - 1] * t / squares).round();
                 bracket.weights[k][i] = weight as u32;
                 all += weight;
             }
@@ -254,7 +253,7 @@ impl Bracket {
 /// levels times their exposures over the sum of the squared exposures, which is the least uncertain one in read noise.
 /// Only the exposures before the first one near its limit are used; the shortest is used up to its limit.
 #[inline(always)]
-pub fn merge_pixel<const N: usize>(
+fn merge_pixel<const N: usize>(
     levels: &[u32; N],
     full: u32,
     limit: u32,
@@ -269,9 +268,9 @@ pub fn merge_pixel<const N: usize>(
     if levels[0] >= full {
         return (0, SATURATED);
     }
-    let sum: u32 = levels.iter().zip(&weights[used]).map(|(l, w)| l * w).sum();
-    let level = (sum + (1 << (PLACES - 1))).saturating_sub(drops[used]) >> PLACES;
-    (used + 1, level.min(SATURATED - 1))
+    let sum: u64 = levels.iter().zip(&weights[used]).map(|(l, w)| u64::from(*l) * u64::from(*w)).sum();
+    let level = (sum + (1 << (PLACES - 1))).saturating_sub(u64::from(drops[used])) >> PLACES;
+    (used + 1, level.min(u64::from(SATURATED) - 1) as u32)
 }
 
 /// Standard deviation of the pixels below a level, from their differences to the pixel after the next.
@@ -381,9 +380,12 @@ mod tests {
 
     #[test]
     fn light_is_the_same_whatever_exposure_shows_it() {
-        for (bits, black, times) in
-            [(8u8, 0.0, vec![1.0, 4.0, 16.0]), (12, 64.0, vec![10.0, 80.0]), (10, 0.0, vec![1.0, 2.0, 5.0, 30.0])]
-        {
+        for (bits, black, times) in [
+            (8u8, 0.0, vec![1.0, 4.0, 16.0]),
+            (12, 64.0, vec![10.0, 80.0]),
+            (10, 0.0, vec![1.0, 2.0, 5.0, 30.0]),
+            (8, 60.0, vec![1.0, 1.2]),
+        ] {
             let bracket = Bracket::new(&times, bits, black).unwrap();
             let (full, last) = (f64::from((1u32 << bits) - 1), times[times.len() - 1]);
             // Light in levels of the longest exposure.

@@ -32,3 +32,10 @@ pub struct FrameRef {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub taken: Option<Taken>,
 }
+
+impl FrameRef {
+    /// File names of the pictures with the laser on, the shortest exposure first.
+    pub fn lasers(&self) -> Vec<String> {
+        self.laser.iter().chain(&self.longer).cloned().collect()
+    }
+}

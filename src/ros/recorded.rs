@@ -5,7 +5,7 @@
 use super::clock::Clock;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Mat3, Rigid, Vec3};
-use crate::raster::Image;
+use crate::raster::{Bracket, Image, MERGED_BITS};
 use crate::recording::{Carries, FrameRef, Motion, Recording, Stand};
 use crate::rig::Rig;
 use crate::scan::{Carrier, Format, Shots};
@@ -15,6 +15,8 @@ use std::collections::BTreeMap;
 /// The recording of a scan.
 pub struct Recorded<'a> {
     recording: &'a Recording,
+    /// The exposures of each pose, if they were merged.
+    bracket: Option<Bracket>,
     /// Index of each shot's frame.
     frames: Vec<usize>,
     flanges: BTreeMap<u32, Rigid<Base, Flange>>,
@@ -44,7 +46,12 @@ impl<'a> Recorded<'a> {
         if report.imported.is_some() {
             return Err(other("the scan was imported and has no recording".into()));
         }
-        let format = Format { width: meta.image.width, height: meta.image.height, bits: recording.bits() };
+        let bracket = meta.bracket()?;
+        if bracket.is_some() && report.exposures.is_none() {
+            return Err(other("its poses have several exposures, the scan is of one of them alone".into()));
+        }
+        let bits = if bracket.is_some() { MERGED_BITS } else { recording.bits() };
+        let format = Format { width: meta.image.width, height: meta.image.height, bits };
         if format != report.image {
             let words = |f: &Format| format!("{}x{} with {} bits", f.width, f.height, f.bits);
             return Err(other(format!("its pictures are {}, the scan's {}", words(&format), words(&report.image))));
@@ -64,7 +71,7 @@ impl<'a> Recorded<'a> {
             Stand::Robot(base_from_flange) => Some((shot, base_from_flange)),
             Stand::Count(_) => None,
         });
-        Ok(Recorded { recording, frames, flanges: flanges.collect() })
+        Ok(Recorded { recording, bracket, frames, flanges: flanges.collect() })
     }
 
     fn frame(&self, shot: u32) -> Option<&FrameRef> {
@@ -76,9 +83,13 @@ impl<'a> Recorded<'a> {
         self.flanges.get(&shot)
     }
 
-    /// The picture of a shot, with its levels made linear as in the scan.
+    /// The picture of a shot, with its levels made linear and its exposures merged as in the scan.
     pub fn picture(&self, shot: u32) -> Result<Option<Image>> {
-        self.frame(shot).and_then(|f| f.laser.as_ref()).map(|name| self.recording.picture(name)).transpose()
+        let Some(frame) = self.frame(shot) else { return Ok(None) };
+        match &self.bracket {
+            Some(bracket) => self.recording.merged(bracket, &frame.lasers()).map(|(image, _)| Some(image)),
+            None => frame.laser.as_ref().map(|name| self.recording.picture(name)).transpose(),
+        }
     }
 
     /// The times of these shots. The inner error states in words why the recording has none.

@@ -240,7 +240,8 @@ impl RecordingSource {
         let format = Format { width: meta.image.width, height: meta.image.height, bits };
         let remaining = jobs.len();
         let shots = ahead(recording.clone(), jobs, &format, merging.clone())?;
-        let remarks = meta.image.response.remark(meta.image.bits).into_iter().collect();
+        let alone = recording.exposure.map(|n| format!("exposure {n} of each pose was scanned alone"));
+        let remarks = meta.image.response.remark(meta.image.bits).into_iter().chain(alone).collect();
         let pictures = Pictures { format, readout: meta.image.readout };
         Ok(RecordingSource { pictures, merging, remarks, remaining, shots })
     }
@@ -251,11 +252,6 @@ type Stood = (Vec<String>, Result<Stand>, Option<Slip>);
 
 fn slip_of(frame: &FrameRef) -> Option<Slip> {
     frame.taken.as_ref()?.slip()
-}
-
-/// The names of a frame's laser pictures, the shortest exposure first.
-fn pictures_of(frame: &FrameRef) -> Vec<String> {
-    frame.laser.iter().chain(&frame.longer).cloned().collect()
 }
 
 /// Pictures with the laser on and their robot poses.
@@ -277,7 +273,7 @@ fn posed(recording: &Recording, poses: Option<&str>) -> Result<Vec<Stood>> {
             .next("record the poses again, or remove the frames without poses from meta.json"));
         };
         let frame = &recording.meta.frames[i];
-        Ok((pictures_of(frame), Ok(Stand::Robot(*base_from_flange)), slip_of(frame)))
+        Ok((frame.lasers(), Ok(Stand::Robot(*base_from_flange)), slip_of(frame)))
     };
     frames.filter_map(|(i, f)| Some((i, f.laser.as_ref()?, f.pose))).map(stand).collect()
 }
@@ -294,7 +290,7 @@ fn counted(recording: &Recording) -> Result<Vec<Stood>> {
                 .next("add its count to the recording, or exclude the shot with --skip-bad")
         };
         let frame = &recording.meta.frames[i];
-        (pictures_of(frame), count.map(Stand::Count).ok_or_else(unknown), slip_of(frame))
+        (frame.lasers(), count.map(Stand::Count).ok_or_else(unknown), slip_of(frame))
     };
     Ok(frames.filter_map(|(i, (f, count))| Some((i, (f.laser.as_ref()?, count)))).map(stand).collect())
 }

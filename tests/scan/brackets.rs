@@ -263,4 +263,5 @@ fn ambient_pictures_and_single_exposures() {
     assert!(other.use_exposure(1).unwrap_err().what.contains("one picture each"));
     let one = bench.try_scan(&other, |_| {}).unwrap();
     assert!(one.report.exposures.is_none() && one.report.image.bits == 8 && !one.cloud.is_empty());
+    assert!(one.report.remarks.iter().any(|r| r.contains("exposure 3 of each pose")), "{:?}", one.report.remarks);
 }
