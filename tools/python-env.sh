@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Makes a Python environment with a set of packages (test, files, genicam, peers) in a folder: for judges, peers and the
-# tests of the Python package. `genicam` has a GenICam program, which tests the GenTL producer. `files` has what its files, conversions, notebooks and tables need and are read again with: 0.7 GB,
-# half of them OpenCV and Arrow. Ray (0.25 GB) is installed by hand: pip install ray. Sheetlight itself never needs
-# Python; without one the tests that need it say that they were skipped.
+# tests of the Python package. `genicam` has a GenICam program, which tests the GenTL producer. `files` has what its
+# files, conversions, notebooks and tables need and are read again with: 0.7 GB, half of them OpenCV and Arrow. Ray
+# (0.25 GB) is installed by hand: pip install ray. Sheetlight itself never needs Python; without one the tests that need
+# it say that they were skipped.
 set -eu
 folder=$1 set=$2
 case $set in

@@ -1,5 +1,5 @@
-//! In: a height map's values, missing cells among them. Out: the same without spikes, small gaps filled. A spike makes a
-//! ring of strong edges, and a gap on an edge hides it: both are the sensor's and not the part's.
+//! In: a height map's values, missing cells among them. Out: the same without spikes, small gaps filled. A spike makes
+//! a ring of strong edges, and a gap on an edge hides it: both are the sensor's and not the part's.
 //! Frame and unit: cells, row by row; mm.
 
 use rayon::prelude::*;
@@ -8,8 +8,8 @@ use rayon::prelude::*;
 const RING: [(isize, isize); 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
 /// Neighbours that must be there before a cell is called a spike.
 const FEWEST: usize = 3;
-/// A spike lies outside the quartiles of its neighbours by more than this many times the quartiles' distance. On a level
-/// with normal noise that is 4.7 sigma. On a step the quartiles are as far apart as the step is high.
+/// A spike lies outside the quartiles of its neighbours by more than this many times the quartiles' distance. On a
+/// level with normal noise that is 4.7 sigma. On a step the quartiles are as far apart as the step is high.
 const FENCE: f32 = 3.0;
 /// A cell with so many neighbours like itself belongs to something narrow, and is no spike.
 const LIKE_ITSELF: usize = 2;
