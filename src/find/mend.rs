@@ -6,8 +6,9 @@ use rayon::prelude::*;
 
 /// The neighbours of a cell; the fourth after one lies opposite it.
 const RING: [(isize, isize); 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
-/// Neighbours that must be there before a cell is called a spike.
-const FEWEST: usize = 3;
+/// Neighbours that must be there before a cell is called a spike. At a corner of the map there are three, and on a slope
+/// the corner is the highest or lowest of all.
+const FEWEST: usize = 5;
 /// A spike lies outside the quartiles of its neighbours by more than this many times the quartiles' distance. On a
 /// level with normal noise that is 4.7 sigma. On a step the quartiles are as far apart as the step is high.
 const FENCE: f32 = 3.0;
@@ -108,13 +109,13 @@ mod tests {
             let rim = x == 0 || y == 0 || x == W - 1 || y == W - 1;
             if (13..17).contains(&x) && (11..15).contains(&y) {
                 assert!(a.is_nan(), "the middle of the wide gap at {x} {y} is {a}");
-            } else if small(x, y) && !rim && !wide(x, y) {
+            } else if small(x, y) && !rim && !(11..19).contains(&x) {
                 // Beside a step a filled cell is on one of its sides, or between them.
                 let near = (0.01 * x as f32 - 0.02..=0.01 * x as f32 + 1.52).contains(a);
                 assert!(near, "{a} at {x} {y}");
                 filled += usize::from((a - b).abs() < 1e-4);
             }
         }
-        assert!(filled > 20, "{filled} cells got their height");
+        assert!(filled > 10, "{filled} cells got their height");
     }
 }

@@ -326,6 +326,17 @@ impl Agreement {
         let (place, noise) = (self.apart - light, NOISE * self.noise * self.pixels as f64);
         let [a, b] = [of.exposures_us[i], of.exposures_us[i + 1]];
         let share = |x: f64| 100.0 * x / self.expected;
+        // What moved also has another light where the longer exposure is readable.
+        if place > OTHER_PLACE * self.expected + noise {
+            return Err(Fault::input(format!(
+                "the pictures of {a} and {b} us disagree by {:.0} % of their light from pixel to pixel, limit {:.0} % \
+                 for their noise",
+                share(place),
+                share(OTHER_PLACE * self.expected + noise)
+            ))
+            .cause("camera or part moved between the exposures, or pictures of two poses are in one frame")
+            .next("stand still for all exposures of a frame"));
+        }
         if light > OTHER_LIGHT * self.expected + noise {
             return Err(Fault::input(format!(
                 "the picture of {a} us has {:.2} times the light that the one of {b} us leads to expect in {} pixels; \
@@ -338,16 +349,6 @@ impl Agreement {
                 "exposures_us or black_level are not the camera's, its levels are not linear, or its gain is automatic",
             )
             .next("compare exposures_us and image.response with the camera"));
-        }
-        if place > OTHER_PLACE * self.expected + noise {
-            return Err(Fault::input(format!(
-                "the pictures of {a} and {b} us disagree by {:.0} % of their light from pixel to pixel, limit {:.0} % \
-                 for their noise",
-                share(place),
-                share(OTHER_PLACE * self.expected + noise)
-            ))
-            .cause("camera or part moved between the exposures, or pictures of two poses are in one frame")
-            .next("stand still for all exposures of a frame"));
         }
         Ok(())
     }

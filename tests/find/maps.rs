@@ -3,6 +3,7 @@
 //! pairs.
 //! Frame and unit: cells and degrees; heights in mm.
 
+use crate::common::{sheetlight, sheetlight_fails};
 use crate::pairs::{boxed, cover, disc, part};
 use rand::{Rng, SeedableRng};
 use rand_distr::{Distribution, Normal};
@@ -124,4 +125,46 @@ fn a_part_taught_by_a_region_of_one_map_is_found_in_another() {
     );
     assert!(found * 100 >= pairs * 97, "{found} of {pairs} are found");
     assert_eq!(strange, 0, "false places");
+}
+
+#[test]
+fn scans_are_taught_and_matched_by_commands_and_other_cells_and_pictures_are_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name).to_str().unwrap().to_string();
+    let mut rng = Pcg64::seed_from_u64(77);
+    let pose = |x: f64, y: f64, angle: f64, scale: f64| Some(Pose { x, y, angle, scale });
+    seen(0.1, 0.02, pose(149.5, 129.5, 0.0, 1.0), 0, &mut rng).save(dir.path().join("first").as_path()).unwrap();
+    seen(0.1, 0.02, pose(120.2, 140.7, 0.5, 1.0), 3, &mut rng).save(dir.path().join("second").as_path()).unwrap();
+    // The same part in cells of another width.
+    let mut coarse = seen(0.1, 0.02, pose(160.4, 110.3, -0.8, 0.8), 0, &mut rng);
+    coarse.cell = 0.125;
+    coarse.save(dir.path().join("coarse").as_path()).unwrap();
+    let (first, second, file) = (at("first"), at("second"), at("bracket.json"));
+    sheetlight(&["teach", &first, "--name", "bracket", "--region", "100,80,100,100", "--out", &file]);
+    assert!(dir.path().join("bracket.png").exists());
+    let found = sheetlight(&["match", &file, &second, &at("coarse"), "--json", "--out", &at("found.json")]);
+    let said: serde_json::Value = serde_json::from_str(&found).unwrap();
+    let number = |k: usize, key: &str| said["pictures"][k]["matches"][0][key].as_f64().unwrap();
+    for (k, x, y, turn, cell) in [(0, 120.2, 140.7, 0.5f64, CELL), (1, 160.4, 110.3, -0.8, 0.125)] {
+        let off = (number(k, "x_px") - x).hypot(number(k, "y_px") - y);
+        assert!(off < 0.1 && (number(k, "angle_deg") - turn.to_degrees()).abs() < 0.1, "{found}");
+        assert!((number(k, "x_mm") - (number(k, "x_px") + 0.5) * cell).abs() < 1e-9, "{found}");
+        assert_eq!(number(k, "scale"), 1.0, "{found}");
+    }
+    assert!(said["units"] == "px, mm, degrees" && said["template"]["mm_per_px"] == CELL, "{found}");
+    // The map of the first scan is its own template as well.
+    let own = sheetlight(&["match", &first, &second, "--template-region", "100,80,100,100", "--json"]);
+    assert_eq!(serde_json::from_str::<serde_json::Value>(&own).unwrap()["pictures"][0], said["pictures"][0]);
+
+    let picture = format!("{first}/height_picture.png");
+    let (code, words) = sheetlight_fails(&["match", &file, &picture]);
+    assert!(code == 2 && words.contains("a picture is searched for a part that a height map taught"), "{words}");
+    let (code, words) = sheetlight_fails(&["match", &picture, &second]);
+    assert!(code == 2 && words.contains("a height map is searched for a part that a picture taught"), "{words}");
+    coarse.cell = 0.3;
+    coarse.save(dir.path().join("coarse").as_path()).unwrap();
+    let (code, words) = sheetlight_fails(&["match", &file, &at("coarse")]);
+    assert!(code == 1 && words.contains("cells are 0.3 mm wide, those of the template 0.1 mm"), "{words}");
+    let (_, words) = sheetlight_fails(&["match", &file, &second, "--out", &format!("{second}/height.json")]);
+    assert!(words.contains("height.json"), "{words}");
 }

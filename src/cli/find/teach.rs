@@ -21,8 +21,8 @@ use std::path::{Path, PathBuf};
 /// The numbers are millimetres in the height map that scan.json and height.png show (from its corner, x along
 /// columns, y along rows). Half a millimetre is close enough; the points give the exact dimensions.
 ///
-/// With --region the part is taught by example: the region of a picture, or of a scan's height map, becomes a template.
-/// sheetlight match finds it in other pictures, or in the maps of other scans.
+/// With --region a part is taught by example: the region of a picture, or of a scan's height map, becomes a template.
+/// sheetlight match then finds it in other pictures or in other scans.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight teach board.png --name relay --region 210,90,64,40 --out relay.json
