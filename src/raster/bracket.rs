@@ -408,6 +408,19 @@ mod tests {
         }
     }
 
+    /// 248 of 255 is near the limit of a longer exposure; the shortest is used up to 254.
+    #[test]
+    fn levels_near_the_limit_of_a_longer_exposure_are_not_used() {
+        let bracket = Bracket::new(&[1.0, 4.0], 8, 0.0).unwrap();
+        let light = |levels: [u32; 2]| {
+            let merged = bracket.merge(&levels.map(|l| flat(8, l, 1))).unwrap().0;
+            (f64::from(merged.get(0, 0)) / bracket.unit * 10.0).round() / 10.0
+        };
+        assert_eq!((light([60, 248]), light([254, 255])), (240.0, 4.0 * 254.0));
+        // (60 + 4 x 247) 4 / 17.
+        assert_eq!(light([60, 247]), 246.6);
+    }
+
     /// Read noise and shot noise of merged pixels are those of docs/math.md, Bracket (3), whatever exposures are left.
     #[test]
     fn merged_pixels_scatter_as_the_formula_says() {
