@@ -70,8 +70,8 @@ fn named(page: &str) -> BTreeSet<String> {
 fn what_a_source_takes_in_is_read() {
     let text = "const A: &str = include_str!(\"../b.wgsl\"); f(include_bytes!(\"c/d.bin\"))";
     assert_eq!(taken_in("src/x/a.rs", text), ["src/b.wgsl", "src/x/c/d.bin"]);
-    let page = named("![x](docs/images/guide-map.png), ARCHITECTURE.md. See docs/robots/, 3/4 and nothing/here.md.");
-    assert_eq!(page.iter().collect::<Vec<_>>(), ["ARCHITECTURE.md", "docs/images/guide-map.png", "docs/robots"]);
+    let page = named("![x](docs/images/guide-found.png), ARCHITECTURE.md. See docs/robots/, 3/4 and nothing/here.md.");
+    assert_eq!(page.iter().collect::<Vec<_>>(), ["ARCHITECTURE.md", "docs/images/guide-found.png", "docs/robots"]);
 }
 
 #[test]

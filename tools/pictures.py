@@ -42,13 +42,6 @@ def report(page, picture):
         browser.close()
 
 
-def smaller(picture, out):
-    """The same pixels in fewer bytes: the program writes its pictures fast, and these are part of the published crate."""
-    from PIL import Image
-
-    Image.open(picture).save(out, optimize=True)
-
-
 def main():
     program = Path(sys.argv[1]).resolve()
     with tempfile.TemporaryDirectory() as name:
@@ -58,8 +51,7 @@ def main():
                 subprocess.run([program, *line.split(), "--quiet"], cwd=folder, check=True)
         board = folder / "scans" / "board"
         overlays = sorted((board / "overlays").glob("*.png"))
-        smaller(folder / "pose.png", IMAGES / "guide-found.png")
-        smaller(board / "height_picture.png", IMAGES / "guide-map.png")
+        shutil.copyfile(folder / "pose.png", IMAGES / "guide-found.png")
         shutil.copyfile(overlays[len(overlays) // 2 - 1], IMAGES / "guide-overlay.png")
         report(folder / "cell3" / "calibration" / "camera.html", IMAGES / "guide-report.png")
         # A year of scans of docs/archives.md.

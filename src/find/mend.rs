@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 /// The neighbours of a cell; the fourth after one lies opposite it.
 const RING: [(isize, isize); 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
-/// Neighbours that must be there before a cell is called a spike. At a corner of the map there are three, and on a slope
-/// the corner is the highest or lowest of all.
+/// Neighbours that must be there before a cell is called a spike. At a corner of the map there are three, and on a
+/// slope the corner is the highest or lowest of all.
 const FEWEST: usize = 5;
 /// A spike lies outside the quartiles of its neighbours by more than this many times the quartiles' distance. On a
 /// level with normal noise that is 4.7 sigma. On a step the quartiles are as far apart as the step is high.

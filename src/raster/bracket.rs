@@ -346,8 +346,8 @@ impl Agreement {
                 100.0 * OTHER_LIGHT
             ))
             .cause(
-                "exposures_us or black_level are not the camera's, its levels are not linear, its gain is automatic, or \
-                 something moved",
+                "exposures_us or black_level are not the camera's, its levels are not linear, its gain is automatic, \
+                 or something moved",
             )
             .next("compare exposures_us and image.response with the camera"));
         }
