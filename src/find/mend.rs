@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn small_gaps_are_filled_on_a_step_too_and_wide_ones_stay() {
-        let small = |x: usize, y: usize| (x * 3 + y * 5) % 11 == 0;
+        let small = |x: usize, y: usize| (x * 3 + y * 5).is_multiple_of(11);
         let wide = |x: usize, y: usize| (12..18).contains(&x) && (10..16).contains(&y);
         let holed = map(|x, y| if small(x, y) || wide(x, y) { f32::NAN } else { step(x, y) });
         let got = mended(&holed, W);
