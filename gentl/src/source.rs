@@ -136,7 +136,7 @@ impl Source {
         matches!(self, Source::Folder { .. })
     }
 
-    /// Begins an acquisition: scans that are already finished are none of its frames.
+    /// Begins an acquisition. Scans that were finished before it do not become frames.
     pub fn begin(&mut self) -> Result<()> {
         if let Source::Folder { folder, seen, .. } = self {
             *seen = scans_in(folder)?;

@@ -12,9 +12,9 @@ const FEWEST: usize = 5;
 /// A spike lies outside the quartiles of its neighbours by more than this many times the quartiles' distance. On a
 /// level with normal noise that is 4.7 sigma. On a step the quartiles are as far apart as the step is high.
 const FENCE: f32 = 3.0;
-/// A cell with so many neighbours like itself belongs to something narrow, and is no spike.
+/// A cell is no spike if this many neighbours are like it: it then belongs to a narrow line.
 const LIKE_ITSELF: usize = 2;
-/// A gap's cell is filled if so many of its neighbours are there. The rim of a wide gap has three: it stays.
+/// A missing cell is filled if it has this many measured neighbours. A cell at the rim of a wide gap has only three.
 const ENOUGH: usize = 5;
 /// Gaps up to this many cells wide are filled from both sides.
 const ROUNDS: usize = 2;

@@ -1,6 +1,6 @@
 //! In: pictures of one pose with different exposure times. Out: one picture with levels proportional to the light, in
 //! which the shortest exposure sets full scale; the shares of its pixels that each exposure gave; what a level of it
-//! scatters. Frame and unit: grey levels; exposure times in microseconds. docs/math.md, Bracket (1) to (4).
+//! scatters. Frame and unit: grey levels; exposure times in microseconds. docs/math.md, Several exposures (1) to (4).
 
 use super::{Image, Pixels};
 use crate::fault::{Fault, Result};
@@ -422,7 +422,7 @@ mod tests {
         assert_eq!(light([60, 247]), 246.6);
     }
 
-    /// Read noise and shot noise of merged pixels are those of docs/math.md, Bracket (3), whatever exposures are left.
+    /// Read noise and shot noise of merged pixels are those of docs/math.md, Several exposures (3), whatever is left.
     #[test]
     fn merged_pixels_scatter_as_the_formula_says() {
         let (times, read, gain, black) = ([1.0, 4.0, 16.0], 3.0, 0.4, 200.0);

@@ -28,5 +28,5 @@ pub type Bool8 = u8;
 pub type Text = *mut c_char;
 /// A place for a value of any type.
 pub type Any = *mut c_void;
-/// The handle that is none.
+/// The value of a handle that stands for no module.
 pub const NONE: Handle = 0;
