@@ -5,10 +5,12 @@ use crate::fault::{Fault, Kind, Result};
 use crate::recording::Beam;
 use std::io::Write;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Interval at which the controller is asked for an answer while work is done with a laser on.
 const ASKED: Duration = Duration::from_millis(100);
+/// Time for which a controller that is not reached is asked again to switch the lasers off.
+const REPEATED: Duration = Duration::from_secs(1);
 
 /// Lasers, lamp and gripper. Dropping it, on whatever path, switches the lasers off. The gripper is not changed,
 /// because what it holds would fall; the lamp is not changed either.
@@ -91,7 +93,8 @@ impl Switchboard {
         lost
     }
 
-    /// Switches both lasers off without changing the lamp.
+    /// Switches both lasers off without changing the lamp. A controller that is not reached is asked again for a
+    /// second: a link that was cut for a moment must not leave a laser on.
     ///
     /// # Errors
     /// A laser may still be on: the controller was not reached, or refused.
@@ -99,7 +102,14 @@ impl Switchboard {
         if !self.burns {
             return Ok(());
         }
-        self.off().map_err(|e| {
+        let begun = Instant::now();
+        let mut off = self.off();
+        // Once the owner knows, it is not kept waiting again.
+        while !self.told && off.as_ref().is_err_and(|e| e.kind != Kind::Refused) && begun.elapsed() < REPEATED {
+            std::thread::sleep(ASKED);
+            off = self.off();
+        }
+        off.map_err(|e| {
             self.told = true;
             let why = if e.kind == Kind::Refused { "refused" } else { "was not reached" };
             Fault::device(format!("the laser may still be on: the controller {why} ({})", e.what))
@@ -170,11 +180,73 @@ impl Drop for Switchboard {
 
 #[cfg(test)]
 mod tests {
-    use super::ASKED;
+    use super::*;
+    use std::sync::{Arc, Mutex};
+
+    /// Outputs of a controller whose link is cut for some time as soon as the line laser is on.
+    #[derive(Clone)]
+    struct Cut {
+        lasts: Duration,
+        at: Arc<Mutex<Option<Instant>>>,
+        on: Arc<Mutex<Vec<u16>>>,
+    }
+
+    impl Cut {
+        fn reached(&self) -> Result<()> {
+            match *self.at.lock().unwrap() {
+                Some(at) if at.elapsed() < self.lasts => Err(Fault::device("the link is cut")),
+                _ => Ok(()),
+            }
+        }
+    }
+
+    impl Switch for Cut {
+        fn put(&mut self, number: u16, on: bool) -> Result<()> {
+            self.reached()?;
+            let mut all = self.on.lock().unwrap();
+            all.retain(|n| *n != number);
+            if on {
+                all.push(number);
+                self.at.lock().unwrap().get_or_insert_with(Instant::now);
+            }
+            Ok(())
+        }
+
+        fn is_on(&mut self, number: u16) -> Result<bool> {
+            self.reached().map(|()| self.on.lock().unwrap().contains(&number))
+        }
+    }
+
+    /// The line laser's link is cut between the order that switches it on and the next one.
+    fn tried(lasts: Duration) -> (Result<()>, Vec<u16>) {
+        let cut = Cut { lasts, at: Arc::default(), on: Arc::default() };
+        let outputs = Outputs::default();
+        let mut all = Switchboard { switch: Box::new(cut.clone()), outputs, light: None, burns: true, told: false };
+        let done = all.lit(Beam::Line, || Ok(()));
+        drop(all);
+        let on = cut.on.lock().unwrap().clone();
+        (done, on)
+    }
+
+    #[test]
+    fn a_link_that_is_cut_for_a_moment_leaves_no_laser_on() {
+        let (done, on) = tried(Duration::from_millis(300));
+        assert!(done.unwrap_err().what.contains("the link is cut"));
+        assert_eq!(on, Vec::<u16>::new());
+    }
+
+    #[test]
+    fn a_link_that_stays_cut_is_reported() {
+        let (done, on) = tried(Duration::from_secs(3600));
+        assert!(done.unwrap_err().what.contains("the laser may still be on: the controller was not reached"));
+        assert_eq!(on, [Outputs::default().line]);
+    }
 
     #[test]
     fn the_document_states_how_often_the_controller_is_asked() {
         let says = format!("is asked every {} ms", ASKED.as_millis());
-        assert!(include_str!("../../docs/robots.md").contains(&says), "{says}");
+        let text = include_str!("../../docs/robots.md");
+        assert!(text.contains(&says), "{says}");
+        assert!(text.contains("repeated for a second") && REPEATED.as_secs() == 1);
     }
 }
