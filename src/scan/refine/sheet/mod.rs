@@ -3,6 +3,7 @@
 //! Frame and unit: the cloud's frame, mm (docs/math.md, Sheets that are thick).
 
 mod lines;
+mod reflectance;
 mod thick;
 
 pub use thick::{SheetFound, Thick};
