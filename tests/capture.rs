@@ -7,10 +7,14 @@ mod common;
 
 #[path = "capture/axis.rs"]
 mod axis;
+#[path = "capture/brackets.rs"]
+mod brackets;
 #[path = "capture/cell.rs"]
 mod cell;
 #[path = "capture/device.rs"]
 mod device;
+#[path = "capture/exposures.rs"]
+mod exposures;
 #[path = "capture/gige.rs"]
 mod gige;
 #[path = "capture/pairing.rs"]

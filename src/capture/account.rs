@@ -29,6 +29,10 @@ pub struct Account {
     pub dropped_processing: u64,
     /// Complete, but the position of what moves is unknown; excluded and listed.
     pub unpaired: u64,
+    /// Complete, but not needed: exposed before a setting took effect, or one more of a pose whose exposures are
+    /// recorded.
+    #[serde(default)]
+    pub spare: u64,
     /// Complete and delivered: recorded, scanned or shown.
     pub used: u64,
     /// Number of times that the camera was lost and came back.
@@ -39,7 +43,8 @@ impl Account {
     /// Pictures that no class explains: anything but 0 is an error of the program.
     pub fn unexplained(&self) -> i64 {
         let [sent, arrived] = [self.sent, self.complete + self.incomplete + self.missed + self.late].map(|n| n as i64);
-        let after = self.dropped_queue + self.dropped_disk + self.dropped_processing + self.unpaired + self.used;
+        let after =
+            self.dropped_queue + self.dropped_disk + self.dropped_processing + self.unpaired + self.spare + self.used;
         (sent - arrived).abs() + (self.complete as i64 - after as i64).abs()
     }
 
@@ -49,7 +54,7 @@ impl Account {
     }
 
     /// Names and numbers, in order.
-    fn rows(&self) -> [(&'static str, u64); 12] {
+    fn rows(&self) -> [(&'static str, u64); 13] {
         [
             ("sent", self.sent),
             ("complete", self.complete),
@@ -61,6 +66,7 @@ impl Account {
             ("dropped_disk", self.dropped_disk),
             ("dropped_processing", self.dropped_processing),
             ("unpaired", self.unpaired),
+            ("spare", self.spare),
             ("used", self.used),
             ("outages", self.outages),
         ]

@@ -68,6 +68,8 @@ pub enum Fate {
     Processing,
     /// The position of what moves is unknown.
     Unpaired,
+    /// It is not needed.
+    Spare,
 }
 
 /// Result of waiting for a feed.
@@ -205,6 +207,7 @@ impl Feed {
             Fate::Disk => &mut a.dropped_disk,
             Fate::Processing => &mut a.dropped_processing,
             Fate::Unpaired => &mut a.unpaired,
+            Fate::Spare => &mut a.spare,
         } += 1;
     }
 
@@ -294,6 +297,13 @@ impl Reader {
                 Event::Incomplete { id, .. } => {
                     self.first.get_or_insert(id);
                     self.shared.lock().ledger.came_in_part(id);
+                }
+                Event::Spare { id, host_ns } => {
+                    self.first.get_or_insert(id);
+                    let mut state = self.shared.lock();
+                    if state.ledger.came(id, host_ns) == Order::Next {
+                        state.ledger.account().spare += 1;
+                    }
                 }
                 Event::Quiet => {}
                 Event::Lost(fault) => {

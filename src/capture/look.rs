@@ -140,38 +140,61 @@ fn share(values: &mut [f64], share: f64) -> f64 {
     values[(share * (values.len() - 1) as f64) as usize]
 }
 
-impl Across {
-    fn add(&mut self, image: &Image, lying: bool) {
-        let full = f64::from(image.full_scale());
-        let (lines, length) = if lying { (image.width, image.height) } else { (image.height, image.width) };
-        self.lines += lines as usize;
-        self.pieces.resize(PIECES, InPiece::default());
-        let mut line = vec![0u16; length as usize];
-        for k in 0..lines {
-            let piece = &mut self.pieces[k as usize * PIECES / lines as usize];
-            piece.lines += 1;
+/// The stripe in one line of a picture across it.
+pub(super) struct Crossing {
+    /// Highest level.
+    pub top: u16,
+    /// Level beside the stripe.
+    pub ground: f64,
+    /// Full width at half height, px.
+    pub width: usize,
+}
+
+/// The stripe in each line of a picture across it; none in a line that does not show it.
+pub(super) fn crossings(image: &Image, lying: bool) -> Vec<Option<Crossing>> {
+    let full = f64::from(image.full_scale());
+    let (lines, length) = if lying { (image.width, image.height) } else { (image.height, image.width) };
+    let mut line = vec![0u16; length as usize];
+    (0..lines)
+        .map(|k| {
             line.iter_mut().zip(0..).for_each(|(l, i)| *l = if lying { image.get(k, i) } else { image.get(i, k) });
-            let Some((at, top)) = line.iter().copied().enumerate().max_by_key(|(_, l)| *l) else { continue };
+            let (at, top) = line.iter().copied().enumerate().max_by_key(|(_, l)| *l)?;
             let mut sorted = line.clone();
             sorted.sort_unstable();
             let part = |share: f64| f64::from(sorted[(share * (sorted.len() - 1) as f64) as usize]);
             let (ground, scatter) = (part(0.5), (part(0.84) - part(0.5)).max(0.5));
             let rises = f64::from(top) - ground;
             if rises < STANDS_OUT * scatter || rises < LEAST * full {
-                continue;
+                return None;
             }
             let half = ground + 0.5 * rises;
             let above = |l: &u16| f64::from(*l) > half;
             let after = line[at..].iter().take_while(|l| above(l)).count();
             let before = line[..at].iter().rev().take_while(|l| above(l)).count();
-            let seen = [f64::from(top) / full, (after + before) as f64, f64::from(top) / ground.max(1.0)];
+            Some(Crossing { top, ground, width: after + before })
+        })
+        .collect()
+}
+
+impl Across {
+    fn add(&mut self, image: &Image, lying: bool) {
+        let full = f64::from(image.full_scale());
+        let crossings = crossings(image, lying);
+        let lines = crossings.len();
+        self.lines += lines;
+        self.pieces.resize(PIECES, InPiece::default());
+        for (k, crossing) in crossings.into_iter().enumerate() {
+            let piece = &mut self.pieces[k * PIECES / lines];
+            piece.lines += 1;
+            let Some(Crossing { top, ground, width }) = crossing else { continue };
+            let seen = [f64::from(top) / full, width as f64, f64::from(top) / ground.max(1.0)];
             piece.seen.iter_mut().zip(seen).for_each(|(all, v)| all.push(v));
             let [peak, width, contrast] = seen;
             self.peaks.push(peak);
             self.widths.push(width);
             self.contrasts.push(contrast);
             self.saturated += u32::from(top == image.full_scale());
-            let eighth = &mut self.along[(k * 8 / lines) as usize];
+            let eighth = &mut self.along[k * 8 / lines];
             *eighth = (eighth.0 + f64::from(top) / full, eighth.1 + 1);
         }
     }

@@ -5,6 +5,7 @@
 mod account;
 mod clock;
 mod delay;
+mod exposure;
 mod feature;
 mod feed;
 mod format;
@@ -16,13 +17,13 @@ mod picture;
 pub mod record;
 pub mod source;
 mod stream;
-mod tune;
 mod uri;
 pub mod wire;
 
 pub use account::{Account, Ledger, Order};
 pub use clock::{ClockMap, Moment, RoundTrip, now_ns};
 pub use delay::{Delay, Delays};
+pub use exposure::{Bracketed, Exposures, Proposal, Tuned, fresh, propose, tune, unexposed};
 pub use feature::{Feature, Range, Value};
 pub use feed::{Fate, Fed, Feed, FeedOptions, Mode};
 pub use format::{Format, Pictures, RawFormat, RawFrames};
@@ -32,5 +33,4 @@ pub use look::PIECES;
 pub use look::{Look, Piece, StripeLook, WANTED, look, look_at};
 pub use picture::{Event, Numbering, Picture, PictureSource};
 pub use stream::{Stream, Streamed};
-pub use tune::{Tuned, fresh, tune, unexposed};
 pub use uri::CameraUri;

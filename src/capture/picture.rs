@@ -57,6 +57,13 @@ pub enum Event {
         /// What is missing, in words.
         why: String,
     },
+    /// A picture arrived complete and is not used: it was exposed before a setting took effect.
+    Spare {
+        /// The device's number of the picture.
+        id: u64,
+        /// Arrival of the last byte, by the host's clock.
+        host_ns: u64,
+    },
     /// The time has passed and nothing arrived.
     Quiet,
     /// The device is lost: cable, power, process. [`PictureSource::reopen`] may bring it back.

@@ -130,8 +130,8 @@ impl std::str::FromStr for CameraUri {
 }
 
 fn sim(seed: &str, query: &str) -> Said<SimSpec> {
-    let keys = ["rate", "speed", "still", "size", "axis", "scene", "delay_ms", "exposure_us", "shows"];
-    let [rate, speed, still, size, axis, scene, delay, exposure, shows] = options(query, keys)?;
+    let keys = ["rate", "speed", "still", "size", "axis", "scene", "delay_ms", "exposure_us", "shows", "stops", "rest"];
+    let [rate, speed, still, size, axis, scene, delay, exposure, shows, stops, rest] = options(query, keys)?;
     let usual = SimSpec::default();
     let seed = seed.parse().map_err(|_| format!("sim:{seed} names no seed, a whole number"))?;
     let size = size.map_or(Ok(usual.size), |s| {
@@ -156,6 +156,8 @@ fn sim(seed: &str, query: &str) -> Said<SimSpec> {
         rate_hz: number("rate", rate, usual.rate_hz)?,
         speed: number("speed", speed, usual.speed)?,
         still: still.map(|s| number("still", Some(s), 0.0)).transpose()?,
+        stops: stops.map(|s| s.parse().map_err(|_| format!("stops={s} is not a whole number"))).transpose()?,
+        rest_s: number("rest", rest, usual.rest_s)?,
         size,
         axis,
         scene: scene.map(PathBuf::from),

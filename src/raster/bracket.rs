@@ -7,10 +7,11 @@ use crate::fault::{Fault, Result};
 
 /// Most exposures of a bracket.
 pub const MOST_EXPOSURES: usize = 4;
-/// Least ratio of two neighbouring exposures, and the largest of the last to the first: beyond it a level of 8 bits in
-/// the longest is less than one of the merged picture's 16.
+/// Least ratio of two neighbouring exposures.
 const LEAST_RATIO: f64 = 1.2;
-const MOST_RATIO: f64 = 256.0;
+/// Largest ratio of the last exposure to the first: beyond it a level of 8 bits in the longest is less than one of the
+/// merged picture's 16.
+pub const MOST_RATIO: f64 = 256.0;
 /// Exposure times, us.
 const TIMES_US: [f64; 2] = [0.1, 1e8];
 /// Depth of a merged picture, bits.

@@ -16,7 +16,7 @@ mod samples;
 mod size;
 mod text;
 
-pub use bracket::{Bracket, Levels, MERGED_BITS, MOST_EXPOSURES, Shares};
+pub use bracket::{Bracket, Levels, MERGED_BITS, MOST_EXPOSURES, MOST_RATIO, Shares};
 pub use file::{Channel, Depth, decode, decode_in_part, load, load_in_part, load_sized, png, save_png};
 pub use float::{float_tiff, read_float_tiff};
 pub use hot::HotPixels;

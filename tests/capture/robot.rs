@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 use std::time::Duration;
 
 /// A cell in real time with a small camera, lasers on, motor on.
-fn cell(change: impl FnOnce(&mut CellOptions)) -> Served {
+pub(super) fn cell(change: impl FnOnce(&mut CellOptions)) -> Served {
     let mut rig = RigSpec::paper();
     (rig.camera.width_px, rig.camera.height_px, rig.camera.pixel_um) = (320, 240, 2.0 * rig.camera.pixel_um);
     let scene = SceneSpec::parse(SCENE).unwrap();
@@ -40,10 +40,10 @@ const SCENE: &str = "name = 'wedges'\nregion_mm = [-30, -9, 30, 9]\n\
     [[solid]]\nshape = { wedge = { size_mm = [14, 14, 9], drop_mm = 7 } }\nat_mm = [20, 0, 7]\nturn_deg = 110\n";
 
 /// A second client that moves the arm.
-struct Mover(Client, Handle, [f64; 6]);
+pub(super) struct Mover(Client, Handle, [f64; 6]);
 
 impl Mover {
-    fn new(served: &Served) -> Mover {
+    pub(super) fn new(served: &Served) -> Mover {
         let options =
             ClientOptions { network: Network::Tcp, patience: Duration::from_secs(30), ..ClientOptions::default() };
         let mut client = Client::connect(&served.robot.to_string(), options).unwrap();
@@ -58,8 +58,13 @@ impl Mover {
 
     /// Straight on by so much along x from where it began; comes back when it is there.
     fn to(&mut self, dx: f64, speed_percent: f64) {
+        self.by([dx, 0.0, 0.0], speed_percent);
+    }
+
+    /// Straight to so far from where it began; comes back when it is there.
+    pub(super) fn by(&mut self, [dx, dy, dz]: [f64; 3], speed_percent: f64) {
         let [x, y, z, rx, ry, rz] = self.2;
-        let pose = Variant::F64s(vec![x + dx, y, z, rx, ry, rz, -1.0]);
+        let pose = Variant::F64s(vec![x + dx, y + dy, z + dz, rx, ry, rz, -1.0]);
         let word = |s: &str| Variant::Text(s.into());
         let goal = Variant::Variants(vec![pose, word("P"), word("@E")]);
         let arguments = vec![self.1.into(), Variant::I32(2), goal, Variant::Text(format!("SPEED={speed_percent}"))];

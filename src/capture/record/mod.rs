@@ -2,11 +2,14 @@
 //! Frame and unit: docs/file-formats.md.
 
 mod backlog;
+mod gather;
+mod poses;
 mod recorder;
 mod run;
 mod space;
 
 pub use backlog::{Backlog, Handing, Recorded, Waits};
+pub use poses::record_poses;
 pub use recorder::{Kept, Recorder, RecorderOptions, Shows, Store};
-pub use run::{Recording as RecordReport, record};
+pub use run::{Exposed, Recording as RecordReport, record};
 pub use space::Space;

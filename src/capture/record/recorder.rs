@@ -64,6 +64,10 @@ pub struct RecorderOptions {
     pub board: Option<BoardSpec>,
     /// How pictures are read from the sensor, if known.
     pub readout: Option<Readout>,
+    /// Exposures of each pose, us, ascending; empty if each has one picture.
+    pub exposures_us: Vec<f64>,
+    /// Level without light, for several exposures; none: 0.
+    pub black_level: Option<f64>,
 }
 
 /// Interval of syncs to the disk: the most that a power cut may cost.
@@ -136,16 +140,29 @@ impl Recorder {
     /// # Errors
     /// The picture cannot be written: it is not part of the recording, which stays valid.
     pub fn add(&mut self, image: &Image, stand: Option<&Stand>, taken: Taken, waiting: usize) -> Result<Kept> {
+        self.add_all(&[image], stand, taken, waiting)
+    }
+
+    /// Adds the pictures of a pose, one for each exposure, the shortest first; `taken` is of the first.
+    ///
+    /// # Errors
+    /// As [`Recorder::add`].
+    pub fn add_all(&mut self, images: &[&Image], stand: Option<&Stand>, taken: Taken, waiting: usize) -> Result<Kept> {
         let raw = match self.options.store {
             Store::Raw => true,
             Store::Png => false,
             Store::Auto => waiting >= HURRY,
         };
-        let name = if raw { self.add_raw(image)? } else { self.add_png(image)? };
+        let mut names = Vec::with_capacity(images.len());
+        for (k, image) in images.iter().enumerate() {
+            names.push(if raw { self.add_raw(image)? } else { self.add_png(image, k)? });
+        }
+        let longer = names.split_off(1);
+        let name = names.remove(0);
         let (laser, ambient) =
             if self.options.shows == Shows::Room { (None, Some(name.clone())) } else { (Some(name.clone()), None) };
         let count = stand.and_then(|s| if let Stand::Count(c) = s { Some(*c) } else { None });
-        let frame = FrameRef { laser, ambient, count, taken: Some(taken), ..FrameRef::default() };
+        let frame = FrameRef { laser, longer, ambient, count, taken: Some(taken), ..FrameRef::default() };
         let mut line = serde_json::to_string(&frame).expect("plain data");
         line.push('\n');
         self.frames.add(line.as_bytes())?;
@@ -169,9 +186,11 @@ impl Recorder {
         Ok(raw_name(RAW, self.raws - 1))
     }
 
-    fn add_png(&mut self, image: &Image) -> Result<String> {
+    /// `exposure` is counted from 0.
+    fn add_png(&mut self, image: &Image, exposure: usize) -> Result<String> {
         let kind = if self.options.shows == Shows::Room { "ambient" } else { "laser" };
-        let name = format!("{kind}_{:06}.png", self.count);
+        let of = if exposure == 0 { String::new() } else { format!("_{}", exposure + 1) };
+        let name = format!("{kind}_{:06}{of}.png", self.count);
         let path = self.folder.join(&name);
         let bytes = crate::raster::png(image);
         crate::files::write_unsynced(&path, &bytes)?;
@@ -243,8 +262,8 @@ fn meta(format: Format, options: &RecorderOptions) -> Meta {
         boards: vec![],
         ambient: None,
         frames: vec![],
-        exposures_us: Vec::new(),
-        black_level: None,
+        exposures_us: options.exposures_us.clone(),
+        black_level: options.black_level.filter(|_| !options.exposures_us.is_empty()),
         frames_file: Some(FRAMES.into()),
         sources: options.sources.clone(),
         motion: options.motion.clone(),

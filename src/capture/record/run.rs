@@ -23,9 +23,25 @@ pub struct Recording {
     pub account: Account,
     /// Pictures without a pose, with the reason.
     pub left_out: Vec<LeftOut>,
+    /// The exposures of each pose, if there were several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exposures: Option<Exposed>,
 }
 
-const GLANCE: Duration = Duration::from_millis(200);
+/// Poses that were recorded with several exposures.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Exposed {
+    /// Exposures as the camera reported them, us.
+    pub exposures_us: Vec<f64>,
+    /// Longest time from the first to the last picture of a pose, s.
+    pub longest_s: f64,
+    /// Poses that were left before all their exposures were taken.
+    pub left: u64,
+}
+
+pub(super) const GLANCE: Duration = Duration::from_millis(200);
+
+pub(super) const ROOM: &str = "make room, then record into another folder; what was recorded can be scanned";
 
 /// Records until the stream ends. `say` receives messages for the user, and the account at intervals. With `on`,
 /// each shot is also handed to the backlog.
@@ -69,7 +85,7 @@ pub fn record(
             Err(fault) => {
                 stream.fate(Fate::Disk);
                 stream.feed().stop();
-                full = Some(fault.next("make room, then record into another folder; what was recorded can be scanned"));
+                full = Some(fault.next(ROOM));
             }
         }
         if let Some(said) = space.warn(recorder.folder(), recorder.bytes()) {
@@ -77,12 +93,23 @@ pub fn record(
         }
     };
     stream.news().into_iter().for_each(|s| say(stream, Some(s)));
-    let (bytes, left_out) = (recorder.bytes(), stream.left_out().to_vec());
+    ended_so(stream, recorder, Vec::new(), full.or(ended))
+}
+
+/// Completes a recording; `more` are excluded pictures that the stream does not know, `fault` ended it.
+pub(super) fn ended_so(
+    stream: &Stream,
+    recorder: Recorder,
+    more: Vec<LeftOut>,
+    fault: Option<Fault>,
+) -> Result<Recording> {
+    let bytes = recorder.bytes();
+    let left_out = [stream.left_out().to_vec(), more].concat();
     let (folder, count) = (recorder.folder().display().to_string(), recorder.count());
     let finished = recorder.finish(&left_out);
-    if let Some(fault) = full.or(ended) {
+    if let Some(fault) = fault {
         return Err(Fault { what: format!("{}; {folder} holds {count} shots, whole", fault.what), ..fault });
     }
     let shots = finished?;
-    Ok(Recording { shots, bytes, account: stream.account(), left_out })
+    Ok(Recording { shots, bytes, account: stream.account(), left_out, exposures: None })
 }

@@ -31,6 +31,10 @@ pub struct SimSpec {
     /// Nothing moves: everything rests at this share of the path. `None`: the position on the path depends on the
     /// time of day.
     pub still: Option<f64>,
+    /// Number of places of the path, evenly apart, at which it stops; none: it stops nowhere.
+    pub stops: Option<u32>,
+    /// Time that it stands at each of them, s.
+    pub rest_s: f64,
     /// Columns and rows, px.
     pub size: [u32; 2],
     /// The axis that moves the parts; none: a robot moves the sensor.
@@ -52,6 +56,8 @@ impl Default for SimSpec {
             rate_hz: 10.0,
             speed: 20.0,
             still: None,
+            stops: None,
+            rest_s: 1.0,
             size: [640, 480],
             axis: None,
             scene: None,
@@ -81,6 +87,8 @@ pub struct SimMotion {
     speed: f64,
     /// Share of the path at which it rests, if it does not move.
     still: Option<f64>,
+    /// Number of stops, and the rest at each, s.
+    stops: Option<(u64, f64)>,
     /// Whether the board is shown.
     board: bool,
 }
@@ -104,6 +112,8 @@ impl SimMotion {
             ("rate", spec.rate_hz, 0.0..=1e3),
             ("speed", spec.speed, 1e-3..=1e4),
             ("still", spec.still.unwrap_or(0.0), 0.0..=1.0),
+            ("stops", spec.stops.map_or(2.0, f64::from), 2.0..=1e6),
+            ("rest", spec.rest_s, 1e-3..=1e3),
             ("delay_ms", spec.delay_ms, -1e3..=1e3),
             ("exposure_us", spec.exposure_us, 1.0..=1e6),
         ];
@@ -142,7 +152,8 @@ impl SimMotion {
             }
         };
         let (speed, still, board) = (spec.speed, spec.still, spec.board);
-        Ok(SimMotion { station: station.into(), scene: scene.into(), way, speed, still, board })
+        let stops = spec.stops.map(|n| (u64::from(n), spec.rest_s));
+        Ok(SimMotion { station: station.into(), scene: scene.into(), way, speed, still, stops, board })
     }
 
     /// What moves, as meta.json states it.
@@ -157,6 +168,18 @@ impl SimMotion {
     fn share(&self, ns: u64, length: f64) -> f64 {
         if let Some(share) = self.still {
             return share;
+        }
+        if let Some((n, rest)) = self.stops {
+            // There and back, one stop after the other.
+            let (ways, moves) = (n - 1, length / (n - 1) as f64 / self.speed);
+            let period = ((rest + moves) * 1e9) as u64;
+            let at = |k: u64| {
+                let k = k % (2 * ways);
+                k.min(2 * ways - k) as f64 / ways as f64
+            };
+            let (k, t) = (ns / period, (ns % period) as f64 * 1e-9);
+            let done = ((t - rest) / moves).clamp(0.0, 1.0);
+            return at(k) + done * (at(k + 1) - at(k));
         }
         let ramp = RAMP.min(0.5 * length / self.speed);
         let once = length / self.speed + ramp;

@@ -2,10 +2,12 @@
 //! suits the stripe.
 //! Frame and unit: features by the standard names (SFNC); px, us.
 
-use crate::capture::{CameraUri, PictureSource, RawFormat, Value, fresh, look, tune, unexposed};
+use crate::capture::{
+    CameraUri, PictureSource, Proposal, RawFormat, Tuned, Value, fresh, look, propose, tune, unexposed,
+};
 use crate::cli::terminal::arguments::parse;
 use crate::cli::terminal::console::Console;
-use crate::fault::{Fault, Result};
+use crate::fault::{Fault, Kind, Result};
 use crate::raster::Image;
 use crate::rig::Rig;
 use crate::scan::{Live, Where, overlay};
@@ -49,6 +51,9 @@ Guide: docs/live.md")]
         station: Option<PathBuf>,
     },
     /// Set the exposure automatically: peaks of the stripe at 70 to 85 % of full scale
+    ///
+    /// Where one exposure cannot hold the scene it also proposes several (sheetlight record --exposures), from
+    /// pictures that it takes with shorter and longer exposures.
     #[command(after_help = "Example:
   sheetlight camera tune --camera gige://first
 Guide: docs/live.md")]
@@ -90,14 +95,46 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
             if let CameraUri::Folder { path, .. } = &named.camera {
                 return Err(unexposed(&path.display().to_string()));
             }
-            let mut source = named.open(console)?;
-            let tuned = tune(source.as_mut(), |us, seen| console.say(format!("{us:.0} us: {seen}")))?;
-            let remark =
-                tuned.remark.as_ref().map_or(String::new(), |said| format!("no exposure is quite right: {said}\n"));
-            console.result(&tuned, &format!("ExposureTime is {:.0} us\n{remark}{}", tuned.exposure_us, tuned.look));
-            Ok(())
+            tune_and_propose(named.open(console)?.as_mut(), console)
         }
     }
+}
+
+/// The exposure that was found, and those that are proposed beside it.
+#[derive(serde::Serialize)]
+struct Exposed<'a> {
+    #[serde(flatten)]
+    tuned: &'a Tuned,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    proposal: Option<Proposal>,
+}
+
+fn tune_and_propose(source: &mut dyn PictureSource, console: &Console) -> Result<()> {
+    let found = tune(source, |us, seen| console.say(format!("{us:.0} us: {seen}")));
+    let heard = |us: f64, saturated: f64| {
+        console.say(format!("{us:.0} us: {:.2} % of the stripe is saturated", 100.0 * saturated));
+    };
+    let tuned = match found {
+        Ok(tuned) => tuned,
+        // What cannot be held by one exposure may be held by several.
+        Err(fault) if fault.kind == Kind::Refused => {
+            return Err(match propose(source, heard) {
+                Ok(Some(p)) => Fault {
+                    what: format!("{}; {p}", fault.what),
+                    next: format!("{}; or record with {}", fault.next, p.option()),
+                    ..fault
+                },
+                _ => fault,
+            });
+        }
+        Err(fault) => return Err(fault),
+    };
+    let proposal = propose(source, heard)?;
+    let remark = tuned.remark.as_ref().map_or(String::new(), |said| format!("no exposure is quite right: {said}\n"));
+    let several = proposal.as_ref().map_or(String::new(), |p| format!("\n{p}"));
+    let text = format!("ExposureTime is {:.0} us\n{remark}{}{several}", tuned.exposure_us, tuned.look);
+    console.result(&Exposed { tuned: &tuned, proposal }, &text);
+    Ok(())
 }
 
 fn list(console: &Console) -> Result<()> {

@@ -3,7 +3,7 @@
 
 use super::readout::ReadoutArgs;
 use crate::capture::pair::{Counting, PoseFeed, PoseUri, Still, Table, Way};
-use crate::capture::{CameraUri, Feed, FeedOptions, Latency, Mode, RawFormat, Stream};
+use crate::capture::{Bracketed, CameraUri, Exposures, Feed, FeedOptions, Latency, Mode, RawFormat, Stream};
 use crate::cli::terminal::arguments::parse;
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
@@ -72,7 +72,7 @@ pub struct Running {
     /// Camera: gige://first, ffmpeg:/dev/video0, folder:PATH, play:RECORDING, ... (docs/live.md)
     #[arg(long, value_name = "URI", value_parser = parse::<CameraUri>)]
     pub camera: Option<CameraUri>,
-    /// End after this number of pictures
+    /// End after this number of pictures, with --exposures of poses
     #[arg(long, requires = "camera")]
     shots: Option<u64>,
     /// End after this time, s
@@ -114,7 +114,12 @@ pub struct Capture {
 impl Running {
     /// Opens the camera.
     pub fn open(&self, raw: Option<RawFormat>, mode: Mode) -> Result<Feed> {
-        let options = FeedOptions {
+        let options = self.feed_options(mode)?;
+        Feed::start(self.named()?.open(raw)?, options)
+    }
+
+    fn feed_options(&self, mode: Mode) -> Result<FeedOptions> {
+        Ok(FeedOptions {
             mode,
             memory: self.memory.clamp(1, 1 << 20) << 20,
             patience: seconds("--patience", self.patience)?,
@@ -122,8 +127,7 @@ impl Running {
             seconds: self.seconds.map(|s| seconds("--seconds", s)).transpose()?.map(|d| d.as_secs_f64()),
             stop: crate::cli::terminal::interrupt::asked_for(),
             readout: self.readout.stated(),
-        };
-        Feed::start(self.named()?.open(raw)?, options)
+        })
     }
 
     /// The camera of the options.
@@ -190,6 +194,41 @@ impl Capture {
         let feed = self.running.open(raw, mode)?;
         latency.map_or(Ok(()), |l| l.of(Some(&self.sources(&feed))))?;
         Ok(Stream::new(feed, way))
+    }
+
+    /// Opens the camera with several exposures for each pose, and the poses. The number of shots is not the feed's.
+    ///
+    /// # Errors
+    /// A pairing with a motion that does not stop; as [`Bracketed::new`].
+    pub fn open_bracketed(
+        &self,
+        raw: Option<RawFormat>,
+        exposures_us: &[f64],
+        black_level: f64,
+    ) -> Result<(Stream, Exposures, Option<u64>)> {
+        let stands = |what: &str, next: &str| {
+            Err(Fault::usage(format!("--exposures and {what}"))
+                .cause("several exposures of a pose need a robot, an axis or parts that stand still at each pose")
+                .next(next))
+        };
+        match self.pair() {
+            Pair::Step | Pair::Given => {}
+            Pair::None => return stands("no pairing", "stop at each pose, and name its source: --pair step"),
+            Pair::Count => return stands("--pair count", "stop at each pose instead of triggering: --pair step"),
+            Pair::Clock => return stands("--pair clock", "stop at each pose: --pair step"),
+        }
+        if let CameraUri::Sim(spec) = self.running.named()?
+            && spec.still.is_none()
+            && spec.stops.is_none()
+        {
+            return stands("a simulated station that never stops", "let it stop: sim:SEED?stops=40");
+        }
+        let options = FeedOptions { shots: None, ..self.running.feed_options(Mode::All)? };
+        let source = Bracketed::new(self.running.named()?.open(raw)?, exposures_us, black_level)?;
+        let exposures = source.exposures();
+        let way = self.way(self.running.named()?, None, None)?;
+        let feed = Feed::start(Box::new(source), options)?;
+        Ok((Stream::new(feed, way), exposures, self.running.shots))
     }
 
     /// The source of the pictures, and that of their poses.

@@ -2,8 +2,8 @@
 //! Frame and unit: docs/file-formats.md.
 
 use super::options::Capture;
-use crate::capture::record::{RecordReport, Recorder, RecorderOptions, Shows, Store, record};
-use crate::capture::{Mode, RawFormat};
+use crate::capture::record::{RecordReport, Recorder, RecorderOptions, Shows, Store, record, record_poses};
+use crate::capture::{Mode, RawFormat, Stream};
 use crate::cli::terminal::arguments::parse;
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
@@ -24,6 +24,8 @@ use std::path::PathBuf;
       --counts-per-shot 20 --out recordings/parcel4
   sheetlight record --camera ffmpeg:/dev/video0 --shows room --board boards/charuco.json \\
       --shots 20 --out recordings/boards
+  sheetlight record --camera gige://first --pair step --pose-stream bcap://10.0.0.2 \\
+      --exposures 300,2000,12000 --out recordings/dark9
   sheetlight record --camera sim:1?rate=10 --pair given --shots 50 --out try/scan
 All options: sheetlight help record
 Guide: docs/live.md")]
@@ -48,6 +50,12 @@ pub struct Args {
     /// Board in the pictures (JSON from sheetlight board)
     #[arg(long)]
     board: Option<PathBuf>,
+    /// Exposures of each pose, us, ascending: 300,2000,12000; what moves has to stand still at each
+    #[arg(long, value_name = "US,US,..", value_delimiter = ',', requires = "camera")]
+    exposures: Vec<f64>,
+    /// Level of a dark pixel, for --exposures
+    #[arg(long, hide_short_help = true, value_name = "LEVEL", requires = "exposures", default_value_t = 0.0)]
+    black_level: f64,
     /// Storage: png, raw (one file of raw frames), auto (raw if PNG is too slow)
     #[arg(long, default_value = "auto", value_parser = parse::<Store>)]
     store: Store,
@@ -56,29 +64,53 @@ pub struct Args {
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let board = args.board.as_deref().map(BoardSpec::load).transpose()?;
     let set = if args.shows == Shows::Room { "boards" } else { "scan" };
-    let mut stream = args.capture.open(args.raw, args.poses.as_deref(), args.station.as_deref(), Mode::All)?;
+    if !args.exposures.is_empty() && args.shows != Shows::Line {
+        return Err(Fault::usage("--exposures is for the stripe, --shows is another")
+            .cause("several exposures are merged where a scan measures the stripe")
+            .next("leave one of the two out"));
+    }
+    let capture = &args.capture;
+    let (mut stream, bracket) = if args.exposures.is_empty() {
+        (capture.open(args.raw, args.poses.as_deref(), args.station.as_deref(), Mode::All)?, None)
+    } else {
+        let (stream, exposures, poses) = capture.open_bracketed(args.raw, &args.exposures, args.black_level)?;
+        (stream, Some((exposures, poses)))
+    };
+    let exposures_us = bracket.as_ref().map_or(Vec::new(), |(e, _)| e.us().to_vec());
+    let each = exposures_us.len().max(1) as u64;
     let options = RecorderOptions {
         set: set.into(),
-        motion: args.capture.motion(),
+        motion: capture.motion(),
         shows: args.shows,
         store: args.store,
-        sources: Some(args.capture.sources(stream.feed())),
+        sources: Some(capture.sources(stream.feed())),
         board,
         readout: stream.pictures().readout,
+        exposures_us,
+        black_level: (args.black_level != 0.0).then_some(args.black_level),
     };
     let recorder = Recorder::create(&args.out, stream.format(), options)?;
-    let mut teller = args.capture.running.teller();
+    let mut teller = capture.running.teller();
     let bar = console.bar("recording", 0);
-    let report = record(&mut stream, recorder, None, |stream, said| {
+    let say = |stream: &Stream, said: Option<String>| {
         teller.hear(stream, said);
         teller.tell(console, &bar);
-        bar.set_position(stream.account().used);
-    });
+        bar.set_position(stream.account().used / each);
+    };
+    let report = match &bracket {
+        Some((exposures, poses)) => record_poses(&mut stream, recorder, exposures, *poses, say),
+        None => record(&mut stream, recorder, None, say),
+    };
     teller.account(&stream);
     teller.tell(console, &bar);
     bar.finish_and_clear();
     let report = report.map_err(|fault| Fault { what: format!("{}; {}", fault.what, stream.account()), ..fault })?;
     console.result(&report, &summary(&report, args));
+    if report.shots == 0 && report.exposures.is_some() {
+        return Err(Fault::refused(format!("no pose was recorded: {}", report.account))
+            .cause("nothing stood still for all exposures of a pose, or the poses do not come")
+            .next("stand still for longer at each pose; left_out.json has the reasons"));
+    }
     if report.shots == 0 {
         return Err(Fault::refused(format!("no picture was recorded: {}", report.account))
             .cause("the camera waits for a trigger, or no picture could be paired")
@@ -93,8 +125,15 @@ fn summary(r: &RecordReport, args: &Args) -> String {
     if r.account.unexplained() != 0 {
         s += &format!("{} pictures are unexplained\n", r.account.unexplained());
     }
+    if let Some(e) = &r.exposures {
+        let us: Vec<String> = e.exposures_us.iter().map(f64::to_string).collect();
+        s += &format!("exposures {} us, {:.2} s a pose at most\n", us.join(", "), e.longest_s);
+        if e.left > 0 {
+            s += &format!("{} poses were left before all their exposures were taken\n", e.left);
+        }
+    }
     if let Some(first) = r.left_out.first() {
-        s += &format!("excluded {} pictures, the first ({}): {}\n", r.account.unpaired, first.id, first.why);
+        s += &format!("excluded {} pictures, the first ({}): {}\n", r.left_out.len(), first.id, first.why);
     }
     s
 }

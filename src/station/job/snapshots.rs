@@ -48,7 +48,7 @@ impl Snapshots {
                     return Err(Fault::input(format!("{}: no more pictures arrive", self.camera.name()))
                         .next("use a camera that runs, not a file"));
                 }
-                Event::Incomplete { .. } | Event::Quiet => {}
+                Event::Incomplete { .. } | Event::Spare { .. } | Event::Quiet => {}
             }
         }
         Err(Fault::device(format!("{}: no picture within {} s", self.camera.name(), PATIENCE.as_secs()))

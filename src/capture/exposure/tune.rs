@@ -1,78 +1,17 @@
-//! In: a camera whose pictures show a stripe. Out: pictures that were exposed after a given moment; the exposure
-//! that suits the stripe.
-//! Frame and unit: exposure in us; shares of full scale; the device's time in ns.
+//! In: a camera whose pictures show a stripe. Out: the exposure that suits the stripe.
+//! Frame and unit: exposure in us; shares of full scale.
 
-use super::feature::{Range, Value};
-use super::look::{Look, MOST_SATURATED, WANTED, look, look_at};
-use super::picture::{Event, PictureSource};
+use super::fresh::Fresh;
+use super::setting::Setting;
+use crate::capture::look::{Look, MOST_SATURATED, WANTED, look, look_at};
+use crate::capture::picture::PictureSource;
 use crate::fault::{Fault, Result};
-use crate::raster::Image;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-/// A sensor that is read while it exposes applies a setting one picture later.
-const PIPELINE: usize = 1;
-/// The same number for pictures without exposure times, counted after those already waiting.
-const UNDATED: usize = 2;
-/// More pictures than any camera's driver buffers.
-const WAITING: usize = 256;
-/// A picture's time and the camera's clock that are farther apart than this, ns, are not of the same clock.
-const ONE_CLOCK: u64 = 60_000_000_000;
 /// Allows for an exposure of seconds, and for cameras that start slowly.
-const PATIENCE: Duration = Duration::from_secs(30);
-
-/// Pictures that were exposed after a given moment, however many older ones are in flight.
-struct Fresh<'a> {
-    source: &'a mut dyn PictureSource,
-    /// That moment by the device's own clock, if it has one.
-    since: Option<u64>,
-    skip: usize,
-    patience: Duration,
-}
-
-impl<'a> Fresh<'a> {
-    fn now(source: &'a mut dyn PictureSource, patience: Duration) -> Fresh<'a> {
-        let since = source.clock().ok().flatten().map(|trip| trip.there_ns);
-        if since.is_none() {
-            (0..WAITING).take_while(|_| matches!(source.next(Duration::ZERO), Event::Picture(_))).for_each(drop);
-        }
-        let skip = if since.is_some() { PIPELINE } else { UNDATED };
-        Fresh { source, since, skip, patience }
-    }
-
-    fn former(&self, begun: Option<u64>) -> bool {
-        let before = |(since, begun): (u64, u64)| begun < since && since - begun < ONE_CLOCK;
-        self.since.zip(begun).is_some_and(before)
-    }
-
-    fn next(&mut self) -> Result<Image> {
-        let until = Instant::now() + self.patience;
-        if self.source.trigger()? {
-            // A triggered camera takes only the picture that is requested.
-            (self.since, self.skip) = (None, 0);
-        }
-        while Instant::now() < until {
-            match self.source.next(Duration::from_millis(100)) {
-                Event::Picture(picture) if self.former(picture.device_ns) => {}
-                Event::Picture(_) if self.skip > 0 => self.skip -= 1,
-                Event::Picture(picture) => return Ok(picture.image),
-                Event::Lost(fault) => return Err(fault),
-                Event::Ended => break,
-                Event::Quiet | Event::Incomplete { .. } => {}
-            }
-        }
-        Err(Fault::input(format!("{}: no picture within {:.0} s", self.source.name(), self.patience.as_secs_f64()))
-            .cause("it waits for a trigger, or its packets are lost (packet size, firewall)")
-            .next("see TriggerMode: sheetlight camera show; or try gige://...?packet=1500"))
-    }
-}
-
-/// The next picture that is exposed after this call.
-///
-/// # Errors
-/// None arrives within `patience`; the camera is lost.
-pub fn fresh(source: &mut dyn PictureSource, patience: Duration) -> Result<Image> {
-    Fresh::now(source, patience).next()
-}
+pub(super) const PATIENCE: Duration = Duration::from_secs(30);
+/// Exposure of a camera that does not report its own, us.
+const USUAL: f64 = 1000.0;
 
 /// Result of tuning.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -106,7 +45,8 @@ const CAREFUL: f64 = WANTED[0] + 0.02;
 /// A source without ExposureTime; no stripe at any exposure; a stripe too bright or too dark at the ends of the
 /// range; a stripe whose glints saturate while the rest is dark.
 pub fn tune(source: &mut dyn PictureSource, mut tried: impl FnMut(f64, &Look)) -> Result<Tuned> {
-    let (name, [low, high], mut exposure_us) = exposure(source)?;
+    let Setting { name, range: [low, high], us } = Setting::of(source)?;
+    let (low, mut exposure_us) = (low.max(1.0), us.unwrap_or(USUAL));
     let mut bounds = Bounds::default();
     for _ in 0..TRIES {
         let seen = judged(source)?;
@@ -133,28 +73,6 @@ fn changes(what: String) -> Fault {
     Fault::refused(what)
         .cause("the light changes: a laser that is switched, room light, something that moves")
         .next("hold everything still and tune again")
-}
-
-/// The fault for a source whose exposure cannot be set.
-pub fn unexposed(name: &str) -> Fault {
-    Fault::usage(format!("{name}: has no ExposureTime to set"))
-        .cause("a pipe, a folder, a file, or a camera whose exposure is set elsewhere")
-        .next("set the exposure there; sheetlight camera snap reports the stripe")
-}
-
-/// The feature's name, its range and its value.
-fn exposure(source: &mut dyn PictureSource) -> Result<(String, [f64; 2], f64)> {
-    let features = source.features()?;
-    let names = ["ExposureTime", "ExposureTimeAbs"];
-    let feature =
-        names.iter().find_map(|n| features.iter().find(|f| f.name == *n)).ok_or_else(|| unexposed(&source.name()))?;
-    let range = if let Range::Between(low, high) = feature.range { [low.max(1.0), high] } else { [1.0, 1e6] };
-    let value = match feature.value {
-        Some(Value::Float(v)) => v,
-        Some(Value::Integer(v)) => v as f64,
-        _ => 1000.0,
-    };
-    Ok((feature.name.clone(), range, value))
 }
 
 /// Assesses present pictures: near a right exposure it uses as many as are needed to measure shares of a few per
@@ -270,8 +188,9 @@ fn factor(seen: &Look) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::feature::Feature;
-    use crate::capture::{Format, Picture, RoundTrip};
+    use crate::capture::feature::{Feature, Range, Value};
+    use crate::capture::{Event, Format, Picture, RoundTrip};
+    use crate::raster::Image;
     use std::collections::VecDeque;
 
     /// Pictures of 100x80 at 50 a second by the camera's own clock. `waiting` of them are always in flight, so that
