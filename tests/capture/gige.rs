@@ -8,7 +8,9 @@ use crate::common::sheetlight_fails;
 use crate::common::tries::{judged, tries};
 use crate::common::wait::until;
 use sheetlight::capture::pair::{Counting, PoseFeed, Sample, Table, Way};
-use sheetlight::capture::{Account, CameraUri, Fate, Fed, Feed, FeedOptions, PictureSource, Stream, Streamed, now_ns};
+use sheetlight::capture::{
+    Account, Bracketed, CameraUri, Fate, Fed, Feed, FeedOptions, PictureSource, Stream, Streamed, now_ns,
+};
 use sheetlight::geometry::{Base, Flange, Rigid, Vec3};
 use sheetlight::raster::Image;
 use sheetlight::recording::{Recording, Stand};
@@ -385,6 +387,46 @@ fn the_fake_cameras_pictures_are_all_explained_and_its_features_kept_to() {
     }
     tries(TRIES, shown_and_kept_to);
     tries(TRIES, comes_back_as_it_was_set);
+    tries(TRIES, exposes_in_turn);
+}
+
+/// Its levels rise with the exposure, though not in proportion. It runs by itself, waits for a wire, or takes pictures
+/// that the program asks for.
+fn exposes_in_turn() -> Result<(), String> {
+    let Some(_camera) = fake("0") else { return Ok(()) };
+    set([("Width", "256"), ("Height", "128"), ("AcquisitionFrameRate", "50")])?;
+    set([("ExposureTime", "700"), ("TriggerMode", "Off"), ("TriggerSource", "Line0")])?;
+    let exposures = [2000.0, 4000.0, 8000.0];
+    for asked in [false, true] {
+        if asked {
+            run(&["camera", "set", "TriggerMode", "On", "--camera", FAKE])?;
+            let fault = Bracketed::new(open(FAKE)?, &exposures, 0.0).err().map(|e| e.what).unwrap_or_default();
+            judged((), fault.contains("it is triggered by Line0"), fault)?;
+            run(&["camera", "set", "TriggerSource", "Software", "--camera", FAKE])?;
+            let dir = tempfile::tempdir().unwrap();
+            run(&["camera", "snap", &text(&dir.path().join("one.png")), "--camera", FAKE])?;
+        }
+        let source = Bracketed::new(open(FAKE)?, &exposures, 0.0).map_err(|e| e.to_string())?;
+        let known = source.exposures();
+        judged((), known.us() == exposures, format!("{:?}", known.us()))?;
+        let feed = Feed::start(Box::new(source), FeedOptions::default()).unwrap();
+        let mut light = [0.0; 3];
+        for k in 0..12 {
+            let Fed::Picture(picture, _) = feed.next(Duration::from_secs(10)) else { return Err("none comes".into()) };
+            feed.fate(Fate::Used);
+            let index = known.index(picture.exposure_ns.expect("stated"));
+            judged((), index == k % 3, format!("picture {k}: {:?}", picture.exposure_ns))?;
+            light[index] += picture.image.to_f32().iter().map(|l| f64::from(*l)).sum::<f64>();
+        }
+        let account = feed.account();
+        drop(feed);
+        let shown = run(&["camera", "show", "--camera", FAKE])?;
+        let now = shown.lines().find(|l| l.starts_with("ExposureTime")).unwrap_or_default();
+        println!("asked {asked}: light of {exposures:?} us: {light:?}; {account}; afterwards {now}");
+        assert!(light.is_sorted_by(|a, b| 1.1 * a < *b), "{light:?}");
+        assert!((account.spare == 0) == asked && now.contains(" 700 "), "{account} {now}");
+    }
+    Ok(())
 }
 
 /// Its power is out for a while: it comes back without its settings, and gets them again.

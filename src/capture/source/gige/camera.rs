@@ -68,6 +68,8 @@ pub struct GigeCamera {
     readout: Option<Readout>,
     pixel_format: String,
     exposure_ns: Option<u64>,
+    /// Whether it takes a picture when it is told to (TriggerMode On, TriggerSource Software).
+    on_command: bool,
     /// ns per tick of its clock.
     tick_ns: f64,
     latch: Option<(&'static str, &'static str)>,
@@ -119,6 +121,7 @@ impl GigeCamera {
             readout: None,
             pixel_format: String::new(),
             exposure_ns: None,
+            on_command: false,
             tick_ns: 1.0,
             latch: None,
             chunk: None,
@@ -145,6 +148,8 @@ impl GigeCamera {
         self.readout = super::readout::of(&self.camera);
         let exposure = EXPOSURE.iter().find_map(|name| self.camera.get_float(name).ok());
         self.exposure_ns = exposure.filter(|us| (0.0..1e9).contains(us)).map(|us| (1e3 * us) as u64);
+        let says = |name: &str, word: &str| self.camera.get_enum(name).is_ok_and(|is| is == word);
+        self.on_command = says("TriggerMode", "On") && says("TriggerSource", "Software");
         let ticks = TICKS.iter().find_map(|name| self.camera.get_integer(name).ok()).filter(|hz| *hz > 0);
         self.tick_ns = ticks.map_or(1.0, |hz| 1e9 / hz as f64);
         let has = |name: &&&str| self.camera.nodemap().node(name).is_some();
@@ -233,6 +238,18 @@ impl PictureSource for GigeCamera {
 
     fn next(&mut self, within: Duration) -> Event {
         self.receive(within)
+    }
+
+    fn trigger(&mut self) -> Result<bool> {
+        if !self.on_command {
+            return Ok(false);
+        }
+        if self.stream.is_none() {
+            self.start()?;
+        }
+        let told = self.camera.execute_command("TriggerSoftware");
+        told.map_err(|e| said(&format!("gige://{}: TriggerSoftware", self.word), &e))?;
+        Ok(true)
     }
 
     fn resent(&self) -> u64 {
