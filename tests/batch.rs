@@ -155,6 +155,46 @@ fn files(folder: &Path) -> Files {
     found
 }
 
+/// Several exposures of a pose are merged as `scan` merges them; another long exposure is another recording.
+#[test]
+fn recordings_of_several_exposures_give_what_a_scan_gives() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let (sim, archive, list) = (at("sim"), at("archive"), at("manifest.txt"));
+    let simulate = ["simulate", "--out", &sim, "--width", "320", "--shots", "20", "--exposures", "0.2,1,5"];
+    done(program(simulate).into_with("--set", "scan"));
+    std::fs::create_dir(&archive).unwrap();
+    std::fs::rename(at("sim/scan"), at("archive/one")).unwrap();
+    done(program(["batch", "manifest", &archive, "--out", &list]));
+    let station = at("sim/station");
+    let (batched, scanned) = (at("batch"), at("scan"));
+    done(program(["batch", &list, "--station", &station, "--out", &batched, "--on", "cpu"]));
+    let one = at("archive/one");
+    done(program(["scan", &one, "--station", &station, "--out", &scanned, "--on", "cpu"]));
+    let found = files(Path::new(&batched));
+    let key = &results(&found)[0];
+    let theirs: Value = serde_json::from_slice(&found[&key.join("scan/scan.json")]).unwrap();
+    let ours: Value = serde_json::from_slice(&std::fs::read(Path::new(&scanned).join("scan.json")).unwrap()).unwrap();
+    assert_eq!(ours["exposures"]["pictures"], 60, "{}", ours["exposures"]);
+    for figure in ["exposures", "points", "shots", "median_sigma_mm"] {
+        assert!(
+            ours[figure] == theirs[figure] && !ours[figure].is_null(),
+            "{figure}: {} {}",
+            ours[figure],
+            theirs[figure]
+        );
+    }
+    // The longest exposure of one pose is exchanged for that of another.
+    let before = std::fs::read_to_string(&list).unwrap();
+    std::fs::copy(at("archive/one/laser_0003_3.png"), at("archive/one/laser_0004_3.png")).unwrap();
+    done(program(["batch", "manifest", &archive, "--out", &at("again.txt")]));
+    assert_ne!(std::fs::read_to_string(at("again.txt")).unwrap(), before);
+    let (again, out) = (at("again.txt"), at("batch2"));
+    let failed = output(program(["batch", &again, "--station", &station, "--out", &out, "--on", "cpu"]));
+    let said = text(&failed.stderr) + &text(&failed.stdout);
+    assert!(said.contains("laser_0004.png") && said.contains("disagree"), "{said}");
+}
+
 /// The folder of a single run of the whole archive, and its files.
 fn single() -> &'static (tempfile::TempDir, Files) {
     static MADE: OnceLock<(tempfile::TempDir, Files)> = OnceLock::new();
