@@ -32,7 +32,8 @@ const BEFORE: &str = "900";
 
 /// A cell with the stripe on the scene alone, in the dark.
 fn dark_cell() -> Served {
-    let served = cell(|o| o.scene = SceneSpec::parse(SCENE).unwrap());
+    // The cell draws other speckle for every picture, also at rest; a real camera at rest sees the same.
+    let served = cell(|o| (o.scene, o.rig.sensor.speckle) = (SceneSpec::parse(SCENE).unwrap(), 0.0));
     let arm = sheetlight::arm::open(&served.robot_uri()).unwrap();
     arm.switch().unwrap().put(served.cell.options().outputs.room, false).unwrap();
     served
@@ -56,10 +57,12 @@ fn exposure(camera: &str) -> f64 {
     features.iter().find(|f| f.name == "ExposureTime").unwrap().value.as_ref().unwrap().to_string().parse().unwrap()
 }
 
-/// Cells of half a millimetre of each material (black, label, solder) with a point that lies on it, and the points.
-fn covered(cloud: &Path, served: &Served) -> [usize; 3] {
+/// Cells of half a millimetre of each material (black, label, solder) with a point that lies on it; the rms distance of
+/// the label's points from its top, mm.
+fn covered(cloud: &Path, served: &Served) -> ([usize; 3], f64) {
     let scene_from_base = served.cell.base_from_scene().inverse();
     let mut cells: [HashSet<[i64; 2]>; 3] = Default::default();
+    let mut label = (0.0, 0.0);
     for p in read_cloud(&cloud.join("cloud.ply")).unwrap() {
         let at = scene_from_base.point(&p.at());
         let inside = |[x0, y0, x1, y1]: [f64; 4]| (x0..x1).contains(&at.x) && (y0..y1).contains(&at.y);
@@ -76,14 +79,17 @@ fn covered(cloud: &Path, served: &Served) -> [usize; 3] {
             continue;
         };
         if (at.z - TOPS[material]).abs() < 0.25 {
+            if material == 1 {
+                label = (label.0 + 1.0, label.1 + (at.z - TOPS[1]).powi(2));
+            }
             cells[material].insert([(2.0 * at.x).floor() as i64, (2.0 * at.y).floor() as i64]);
         }
     }
-    cells.map(|c| c.len())
+    (cells.map(|c| c.len()), (label.1 / label.0).sqrt())
 }
 
 #[test]
-fn exposures_that_tuning_proposes_are_recorded_and_show_black_and_bright_materials() {
+fn exposures_that_tuning_proposes_are_recorded_and_show_all_materials() {
     let served = dark_cell();
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| text(&dir.path().join(name));
@@ -93,14 +99,11 @@ fn exposures_that_tuning_proposes_are_recorded_and_show_black_and_bright_materia
     let (camera, robot) = (format!("cell://{}?rate=20", served.camera), served.robot_uri());
     let (start, mover) = (served.cell.reported(0.0), RefCell::new(Mover::new(&served)));
     sheetlight(&["camera", "set", "ExposureTime", BEFORE, "--camera", &camera]);
-    // The stripe across table, black and label: an exposure suits the label, and several are proposed.
+    // The stripe across table, black and label: where the black is measurable, the label is not yet saturated.
     mover.borrow_mut().by(motion(&served, &start, &station, 3.0), 20.0);
     let tuned = sheetlight(&["camera", "tune", "--camera", &camera, "--json"]);
     let tuned: serde_json::Value = serde_json::from_str(&tuned).unwrap();
-    let proposal = &tuned["proposal"];
-    println!("{tuned:#}");
-    assert!(proposal["exposures_us"].as_array().is_some_and(|all| (2..=4).contains(&all.len())), "{proposal}");
-    assert!(proposal["saturated"].as_f64().unwrap() > 0.005, "{proposal}");
+    assert!(tuned["proposal"].is_null() && tuned["exposure_us"].is_number(), "{tuned}");
     assert_eq!(exposure(&camera), tuned["exposure_us"].as_f64().unwrap(), "what was tuned stays set");
     // Across two solder joints too: no single exposure suits, and the refusal names those that do.
     mover.borrow_mut().by(motion(&served, &start, &station, 0.0), 20.0);
@@ -136,18 +139,22 @@ fn exposures_that_tuning_proposes_are_recorded_and_show_black_and_bright_materia
         let scan = json(&Path::new(&out).join("scan.json"));
         (covered(Path::new(&out), &served), scan)
     };
-    let (merged, figures) = scan(0);
-    let alone: Vec<[usize; 3]> = (1..=exposures.len()).map(|n| scan(n).0).collect();
-    println!("cells of black, label and solder: merged {merged:?}, alone {alone:?}");
+    let ((merged, rms), figures) = scan(0);
+    let alone: Vec<([usize; 3], f64)> = (1..=exposures.len()).map(|n| scan(n).0).collect();
+    println!("cells of black, label and solder, rms on the label: merged {merged:?} {rms:.4}, alone {alone:?}");
     let stated = &figures["exposures"];
     assert_eq!(stated["exposures_us"], serde_json::json!(exposures), "{stated}");
     assert_eq!(stated["pictures"], serde_json::json!(POSES * exposures.len()), "{stated}");
+    // On black beside a bright stripe a merged picture has fewer points than the longest exposure: the threshold's window
+    // has the mean of light that the longest exposure cuts off (docs/scanning.md, Dark and shiny parts).
     for material in 0..3 {
-        let best = alone.iter().map(|c| c[material]).max().unwrap();
-        assert!(merged[material] as f64 >= 0.97 * best as f64, "material {material}: {merged:?} {alone:?}");
+        let best = alone.iter().map(|(cells, _)| cells[material]).max().unwrap();
+        assert!(merged[material] as f64 >= 0.9 * best as f64, "material {material}: {merged:?} {alone:?}");
     }
-    // The shortest does not show the black.
-    assert!(alone[0][0] * 2 < merged[0] && merged.iter().all(|n| *n > 20), "{merged:?} {alone:?}");
+    // Those that show the label unsaturated do not show all of the black, the longest saturates the label.
+    let (shortest, longest) = (&alone[0], &alone[alone.len() - 1]);
+    assert!(shortest.0[0] * 2 < merged[0] && merged.iter().all(|n| *n > 10), "{merged:?} {alone:?}");
+    assert!(rms < longest.1, "{rms} {alone:?}");
 }
 
 /// The robot goes on once a pose is recorded; `way` has its places.

@@ -159,7 +159,7 @@ impl Run<'_> {
             return Err(Fault { what: format!("{DISAGREE} poses in a row: {}", fault.what), ..fault });
         }
         let more = self.exposures.wait_longer().map_or(String::new(), |n| {
-            format!("; from now on {n} more pictures are left out after each setting of the exposure")
+            format!("; from now on {n} more pictures are excluded after each setting of the exposure")
         });
         Ok((self.disagree <= TOLD).then(|| format!("{}; the pose is taken again{more}", fault.what)))
     }
