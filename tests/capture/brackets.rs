@@ -145,8 +145,8 @@ fn exposures_that_tuning_proposes_are_recorded_and_show_all_materials() {
     let stated = &figures["exposures"];
     assert_eq!(stated["exposures_us"], serde_json::json!(exposures), "{stated}");
     assert_eq!(stated["pictures"], serde_json::json!(POSES * exposures.len()), "{stated}");
-    // On black beside a bright stripe a merged picture has fewer points than the longest exposure: the threshold's window
-    // has the mean of light that the longest exposure cuts off (docs/scanning.md, Dark and shiny parts).
+    // On black beside a bright stripe a merged picture has fewer points than the longest exposure: the threshold's
+    // window has the mean of light that the longest exposure cuts off (docs/scanning.md, Dark and shiny parts).
     for material in 0..3 {
         let best = alone.iter().map(|(cells, _)| cells[material]).max().unwrap();
         assert!(merged[material] as f64 >= 0.9 * best as f64, "material {material}: {merged:?} {alone:?}");
