@@ -50,6 +50,18 @@ impl Recording {
         Ok(self.loaded.get_or_init(|| poses))
     }
 
+    /// Refuses to give one picture of a pose that has several exposures: its levels are not those that a scan merges.
+    fn one_each(&self) -> Result<()> {
+        match self.inner.meta.exposures_us.len() {
+            0 => Ok(()),
+            n => Err(Fault::usage(format!("each pose has {n} pictures of different exposures, not one"))
+                .cause("exposures_us in meta.json")
+                .next(
+                    "scan the recording itself: scan(recording, station); recording.picture(name) reads one picture",
+                )),
+        }
+    }
+
     /// Frames with the laser on: place in the recording, picture's name.
     fn lit(&self) -> Vec<(usize, &str)> {
         let named = self.inner.meta.frames.iter().enumerate();
@@ -135,6 +147,7 @@ impl Recording {
         let Some(&(frame, name)) = usize::try_from(at).ok().and_then(|i| lit.get(i)) else {
             return Err(PyIndexError::new_err(format!("picture {index} of {}", lit.len())));
         };
+        self.one_each().or_raise()?;
         let pose = self.inner.pose_of(frame, self.robot().or_raise()?).or_raise()?;
         Ok((self.picture(py, name)?, matrix(py, pose)))
     }
