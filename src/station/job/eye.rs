@@ -3,7 +3,7 @@
 use super::snapshots::Snapshots;
 use crate::arm::Switchboard;
 use crate::capture::{PictureSource, Pictures};
-use crate::fault::Result;
+use crate::fault::{Fault, Kind, Result};
 use crate::raster::Image;
 use crate::recording::Beam;
 
@@ -29,6 +29,7 @@ impl Eye {
     /// laser stays on afterwards: the caller takes the next picture, or ends with [`Switchboard::after`].
     pub fn picture(&mut self, beam: Option<Beam>) -> Result<Image> {
         self.lights.light(beam)?;
-        self.snapshots.fresh()
+        // Whatever a camera does wrong while a job runs, no file is at fault.
+        self.snapshots.fresh().map_err(|fault| Fault { kind: Kind::Device, ..fault })
     }
 }

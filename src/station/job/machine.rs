@@ -12,7 +12,7 @@ use super::state::{BACKED_OUT, JobState, Phase, Resumes};
 use super::sweep::{Board, checked, sweep};
 use crate::arm::rules::{Confirmation, Evidence, Guard, Plan, Proposal};
 use crate::arm::{Arm, Motion, Switchboard, Way};
-use crate::fault::{Fault, Gate, Result};
+use crate::fault::{Fault, Gate, Kind, Result};
 use crate::find::insert::picture;
 use crate::find::{CutOff, LocateOptions, Recipe, Report, beyond_rim, locate};
 use crate::geometry::{Base, Flange, Rigid, Vec3};
@@ -59,6 +59,8 @@ pub struct Job<'a> {
     pub(super) eye: Eye,
     pub(super) operator: &'a mut dyn Operator,
     pub(super) state: JobState,
+    /// The kind of the fault that stopped it.
+    kind: Option<Kind>,
     found: Option<Report>,
     since: Instant,
 }
@@ -113,7 +115,8 @@ impl<'a> Job<'a> {
         // The first action switches off what a killed program left on.
         let lights = Switchboard::of(guard.link(), settings.outputs.unwrap_or_default())?;
         let eye = Eye::new(camera, lights);
-        Ok(Job { options, settings, rig, recipe, guard, eye, operator, state, found: None, since: Instant::now() })
+        let since = Instant::now();
+        Ok(Job { options, settings, rig, recipe, guard, eye, operator, state, kind: None, found: None, since })
     }
 
     /// Does the remaining steps. If anything stops the job, the report says why; the arm then stands still and the
@@ -148,6 +151,7 @@ impl<'a> Job<'a> {
                 Ok(next) => self.state.phase = next,
                 Err(fault) => {
                     self.operator.tell(&format!("stopped: {}", fault.what));
+                    self.kind = Some(fault.kind);
                     self.state.why = fault.what;
                     self.state.stopped = true;
                     self.state.moving = self.guard.unknown().is_some();
@@ -155,7 +159,7 @@ impl<'a> Job<'a> {
             }
             self.store()?;
         }
-        let report = JobReport::of(&self.state, self.found.take());
+        let report = JobReport::of(&self.state, self.kind, self.found.take());
         let text = serde_json::to_string_pretty(&report).expect("plain data");
         crate::files::write(&self.options.out.join("report.json"), text.as_bytes())?;
         Ok(report)

@@ -2,6 +2,7 @@
 //! Frame and unit: s; mm, degrees.
 
 use super::state::{JobState, Phase, Resumes};
+use crate::fault::Kind;
 use crate::find::Report;
 use std::collections::BTreeMap;
 
@@ -22,6 +23,9 @@ pub struct JobReport {
     pub outcome: Outcome,
     /// Why it was stopped; empty otherwise.
     pub why: String,
+    /// The kind of the fault that stopped it; `None` otherwise.
+    #[serde(skip)]
+    pub kind: Option<Kind>,
     /// The phase that it reached.
     pub phase: Phase,
     /// How it continues when it is resumed.
@@ -41,11 +45,12 @@ pub struct JobReport {
 }
 
 impl JobReport {
-    pub(super) fn of(state: &JobState, found: Option<Report>) -> JobReport {
+    pub(super) fn of(state: &JobState, kind: Option<Kind>, found: Option<Report>) -> JobReport {
         let outcome = if state.phase == Phase::Done { Outcome::Inserted } else { Outcome::Stopped };
         JobReport {
             outcome,
             why: state.why.clone(),
+            kind,
             phase: state.phase,
             resumes: state.resumes(),
             seconds: state.seconds,

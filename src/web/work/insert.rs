@@ -7,7 +7,7 @@ use super::found::RECIPE;
 use super::recipes::load;
 use super::resumes::INSERTION;
 use super::run::Run;
-use crate::fault::{Fault, Result};
+use crate::fault::{Fault, Kind, Result};
 use crate::robot::Convention;
 use crate::scan::Where;
 use crate::station::Settings;
@@ -49,11 +49,13 @@ pub(super) fn insert(this: &Run, order: &InsertOrder) -> Result<Outcome> {
         this.progress(done, Some(STEPS.len()));
     };
     let mut person = Person { desk, job: &this.id, stop: &this.stop, robot, within_s, step: &step, late: false };
-    let job = Job::open(&options, session.guard(), camera.lend()?, &mut person)?;
+    let pictures = camera.lend().map_err(|fault| Fault { kind: Kind::Device, ..fault })?;
+    let job = Job::open(&options, session.guard(), pictures, &mut person)?;
     let report = if order.back_out { job.back_out() } else { job.run() }?;
     if report.outcome == Ended::Stopped {
         let next = report.next();
-        return Err(Fault::refused(report.why).cause("the job was stopped; the arm stands still").next(next));
+        let kind = report.kind.unwrap_or(Kind::Refused);
+        return Err(Fault::new(kind, report.why).cause("the job was stopped; the arm stands still").next(next));
     }
     this.progress(STEPS.len(), Some(STEPS.len()));
     Ok(Outcome::Insert(Box::new(Inserted {
