@@ -100,6 +100,18 @@ fn executed(pdu: &[u8], registers: &mut Registers, from: IpAddr) -> Result<(Vec<
     }
 }
 
+/// Why an answer refuses its request; `None` if it does not.
+pub fn refusal(answer: &[u8]) -> Option<&'static str> {
+    let [function, code, ..] = answer.get(HEAD + 1..)? else { return None };
+    Some(match (function & 0x80, *code) {
+        (0, _) => return None,
+        (_, FUNCTION) => "exception 1: another function",
+        (_, ADDRESS) => "exception 2: other registers",
+        (_, BUSY) => "exception 6: a request is executed, or another PLC makes the requests",
+        _ => "exception 3: a wrong count, or a number that does not follow the last answered one",
+    })
+}
+
 fn word(bytes: &[u8], at: usize) -> u16 {
     u16::from_be_bytes([bytes[at], bytes[at + 1]])
 }
@@ -124,7 +136,7 @@ mod tests {
     }
 
     fn registers() -> Registers {
-        Registers::new(Convention::Denso, Duration::from_secs(10), 0).unwrap()
+        Registers::new(Convention::Denso, Duration::from_secs(10), 0, false).unwrap()
     }
 
     #[test]
@@ -157,7 +169,10 @@ mod tests {
             (&[23, 0, 36, 0, 1, 0, 0, 0, 1, 2, 0, 5], ADDRESS),
         ] {
             assert_eq!(said(&mut r, pdu), [pdu[0] | 0x80, code], "{pdu:?}");
+            let whole = [&[0; HEAD + 1][..], &[pdu[0] | 0x80, code]].concat();
+            assert!(refusal(&whole).unwrap().starts_with(&format!("exception {code}: ")));
         }
+        assert_eq!(refusal(&[0, 1, 0, 0, 0, 5, 1, 4, 2, 0, 1]), None);
         assert_eq!(r.written(0, 1), Ok(vec![0]), "nothing was written");
     }
 

@@ -2,46 +2,13 @@
 //! docs/connections.md has the map.
 //! Frame and unit: 1/1000 mm and 1/10,000 degree, 32-bit signed, high word first [modbus 4.2: big-endian].
 
+use super::shown::{self, Shown};
+use super::table::{PER_DEGREE, PER_MM, POSE, TABLE, holding, input, request};
 use super::words::{self, Code, Of, Reply, Request, Which, Wrong};
 use crate::fault::{Fault, Result};
 use crate::robot::Convention;
 use std::net::IpAddr;
 use std::time::{Duration, Instant};
-
-/// Number of the map; it changes with the meaning of a register.
-const MAP: u16 = 1;
-/// Registers of a pose: six numbers of two words.
-const POSE: usize = 12;
-/// Units of the registers in a mm and in a degree. 1/10,000 degree is 0.9 um at half a metre.
-const PER_MM: f64 = 1000.0;
-const PER_DEGREE: f64 = 10_000.0;
-
-/// Addresses that the PLC writes.
-mod holding {
-    pub const NUMBER: usize = 0;
-    pub const WORD: usize = 1;
-    pub const WHICH: usize = 2;
-    pub const OF: usize = 3;
-    pub const POSE: usize = 4;
-    pub const RECIPE: usize = 16;
-    pub const COUNT: usize = 36;
-}
-
-/// Addresses that it reads.
-mod input {
-    pub const MAP: usize = 0;
-    pub const SECONDS: usize = 1;
-    pub const BUSY: usize = 2;
-    pub const ANSWERED: usize = 3;
-    pub const ERROR: usize = 4;
-    pub const STATE: usize = 5;
-    pub const SHOTS: usize = 6;
-    pub const SCORE: usize = 7;
-    pub const POSE: usize = 8;
-    pub const LENGTH: usize = 20;
-    pub const WORDS: usize = 21;
-    pub const COUNT: usize = 121;
-}
 
 /// Why registers are not read or written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,6 +28,8 @@ pub struct Asked {
     pub number: u16,
     /// The request, or what is wrong with it.
     pub request: std::result::Result<Request, Wrong>,
+    /// Who made it.
+    pub from: IpAddr,
     /// Another PLC made the requests before: it knows nothing of their scan.
     pub by_another: bool,
 }
@@ -68,8 +37,10 @@ pub struct Asked {
 /// All registers.
 pub struct Registers {
     notation: Convention,
-    holding: [u16; holding::COUNT],
-    input: [u16; input::COUNT],
+    /// The table has the registers of jobs.
+    jobs: bool,
+    holding: Vec<u16>,
+    input: Vec<u16>,
     since: Instant,
     asks: Option<(IpAddr, Instant)>,
     /// Another PLC has taken over and made no request yet.
@@ -81,24 +52,29 @@ impl Registers {
     /// Registers of poses in `notation`. A PLC that makes requests is the only one until it is silent for `patience`.
     /// `answered` stands as the number of the last answered request, though there was none yet. A PLC writes its last
     /// request in every cycle, also after this program started again: a number that it cannot know keeps that from
-    /// being executed a second time.
+    /// being executed a second time. `jobs`: the table has the registers of jobs.
     ///
     /// # Errors
     /// The notation is not of six numbers in mm and degrees.
-    pub fn new(notation: Convention, patience: Duration, answered: u16) -> Result<Registers> {
+    pub fn new(notation: Convention, patience: Duration, answered: u16, jobs: bool) -> Result<Registers> {
         let unit = |label: &&str| label.ends_with(" mm") || label.ends_with(" deg");
         let labels = notation.labels();
         if labels.len() != POSE / 2 || !labels.iter().all(unit) {
             let what = format!("Modbus has no registers for poses in the notation {}", notation.name());
             return Err(Fault::usage(format!("{what}: {}", labels.join(", ")))
                 .cause("its registers hold six numbers in mm and degrees")
-                .next("give --notation denso, kuka, fanuc or yaskawa, or serve text lines"));
+                .next("choose the notation denso, kuka, fanuc or yaskawa, or serve text lines"));
         }
-        let mut input = [0; input::COUNT];
-        (input[input::MAP], input[input::ANSWERED]) = (MAP, answered);
+        let [written, read] = match jobs {
+            true => [holding::COUNT_WITH_JOBS, input::COUNT_WITH_JOBS],
+            false => [holding::COUNT, input::COUNT],
+        };
+        let mut input = vec![0; read];
+        (input[input::TABLE], input[input::ANSWERED]) = (TABLE, answered);
         Ok(Registers {
             notation,
-            holding: [0; holding::COUNT],
+            jobs,
+            holding: vec![0; written],
             input,
             since: Instant::now(),
             asks: None,
@@ -139,7 +115,7 @@ impl Registers {
     ) -> std::result::Result<Option<Asked>, Refused> {
         let begin = usize::from(address);
         let end = begin + values.len();
-        if values.is_empty() || end > holding::COUNT {
+        if values.is_empty() || end > self.holding.len() {
             return Err(Refused::Address);
         }
         let owner = self.asks.filter(|(_, last)| now.duration_since(*last) < self.patience).map(|(who, _)| who);
@@ -154,7 +130,8 @@ impl Registers {
         }
         if self.asks.is_some_and(|(who, _)| who != from) {
             // What the other PLC wrote is no part of this one's request.
-            (self.taken_over, self.holding) = (true, [0; holding::COUNT]);
+            self.taken_over = true;
+            self.holding.fill(0);
         }
         self.asks = Some((from, now));
         self.holding[begin..end].copy_from_slice(values);
@@ -163,7 +140,7 @@ impl Registers {
         }
         self.input[input::BUSY] = 1;
         let by_another = std::mem::take(&mut self.taken_over);
-        Ok(Some(Asked { number, request: self.request(), by_another }))
+        Ok(Some(Asked { number, request: self.request(), from, by_another }))
     }
 
     fn request(&self) -> std::result::Result<Request, Wrong> {
@@ -172,19 +149,28 @@ impl Registers {
             x => Err(Wrong::new(Code::Word, format!("register {at} is {x}, 0 to {most} {what}"))),
         };
         match self.holding[holding::WORD] {
-            1 => Ok(Request::Scan),
-            2 => Ok(Request::Pose(self.pose())),
-            3 => words::recipe(&self.recipe()).map(Request::Find),
-            4 => {
+            request::SCAN => Ok(Request::Scan),
+            request::POSE => Ok(Request::Pose(self.pose())),
+            request::FIND => words::recipe(&self.recipe()).map(Request::Find),
+            request::GIVE => {
                 let which = [Which::Approach, Which::Insertion, Which::Retract];
                 let which = which[usize::from(choice(holding::WHICH, "are approach, insertion, retract", 2)?)];
                 let of = [Of::Tool, Of::Flange][usize::from(choice(holding::OF, "are tool, flange", 1)?)];
                 Ok(Request::Give(which, of))
             }
-            x => Err(Wrong::new(
-                Code::Word,
-                format!("register {} is {x}; 1 SCAN, 2 POSE, 3 FIND and 4 GIVE are requests", holding::WORD),
-            )),
+            request::INSERT if self.jobs => {
+                let recipe = words::recipe(&self.recipe())?;
+                let sweep_mm = self.numbers(holding::SWEEP, 1).map(|n| f64::from(n) / PER_MM).next();
+                Ok(Request::Insert { recipe, sweep_mm: sweep_mm.filter(|mm| *mm != 0.0) })
+            }
+            request::STOP if self.jobs => Ok(Request::Stop),
+            x => {
+                let known = match self.jobs {
+                    true => "1 SCAN, 2 POSE, 3 FIND, 4 GIVE, 5 INSERT and 6 STOP",
+                    false => "1 SCAN, 2 POSE, 3 FIND and 4 GIVE",
+                };
+                Err(Wrong::new(Code::Word, format!("register {} is {x}; {known} are requests", holding::WORD)))
+            }
         }
     }
 
@@ -192,14 +178,19 @@ impl Registers {
         self.notation.labels().iter().map(|l| if l.ends_with(" mm") { PER_MM } else { PER_DEGREE })
     }
 
+    /// So many numbers of two registers.
+    fn numbers(&self, at: usize, count: usize) -> impl Iterator<Item = i32> {
+        let words = &self.holding[at..at + 2 * count];
+        words.chunks_exact(2).map(|w| (u32::from(w[0]) << 16 | u32::from(w[1])) as i32)
+    }
+
     fn pose(&self) -> Vec<f64> {
-        let words = &self.holding[holding::POSE..holding::POSE + POSE];
-        let number = |w: &[u16]| (u32::from(w[0]) << 16 | u32::from(w[1])) as i32;
-        words.chunks_exact(2).zip(self.scales()).map(|(w, scale)| f64::from(number(w)) / scale).collect()
+        self.numbers(holding::POSE, POSE / 2).zip(self.scales()).map(|(n, scale)| f64::from(n) / scale).collect()
     }
 
     fn recipe(&self) -> String {
-        let bytes = self.holding[holding::RECIPE..].iter().flat_map(|w| w.to_be_bytes()).take_while(|b| *b != 0);
+        let words = &self.holding[holding::RECIPE..holding::SWEEP];
+        let bytes = words.iter().flat_map(|w| w.to_be_bytes()).take_while(|b| *b != 0);
         bytes.map(char::from).collect::<String>().trim_end().to_owned()
     }
 
@@ -207,42 +198,50 @@ impl Registers {
     pub fn answer(&mut self, number: u16, said: &std::result::Result<Reply, Wrong>, state: &Reply) {
         self.input[input::ERROR] = said.as_ref().err().map_or(0, |w| w.code as u16);
         let words = said.as_ref().err().map(words::plain).unwrap_or_default();
-        self.words(&words);
-        match state {
-            Reply::Scanning(shots) => self.state(1, *shots as u16),
-            Reply::Found(_) => self.state(2, self.input[input::SHOTS]),
-            _ => self.state(0, 0),
-        }
+        shown::letters(&mut self.input, input::LENGTH, &words);
+        self.state(state);
         match said {
             Ok(Reply::Score(score)) => self.input[input::SCORE] = (score * 1000.0).round() as u16,
             _ if !matches!(state, Reply::Found(_)) => self.input[input::SCORE] = 0,
             _ => {}
         }
         // Only a GIVE that succeeded leaves a pose: an old one must not be taken for an answer.
-        let mut pose = [0; POSE];
+        self.input[input::POSE..input::POSE + POSE].fill(0);
         if let Ok(Reply::Pose(numbers)) = said {
-            for ((words, x), scale) in pose.chunks_exact_mut(2).zip(numbers).zip(self.scales()) {
-                let whole = (x * scale).round() as i32 as u32;
-                words.copy_from_slice(&[(whole >> 16) as u16, whole as u16]);
-            }
+            let units = self.scales();
+            shown::numbers(&mut self.input, input::POSE, numbers, units);
         }
-        self.input[input::POSE..input::POSE + POSE].copy_from_slice(&pose);
         self.input[input::ANSWERED] = number;
         self.input[input::BUSY] = 0;
     }
 
-    fn state(&mut self, state: u16, shots: u16) {
+    /// Puts the session's state into the registers.
+    fn state(&mut self, state: &Reply) {
+        let (state, shots) = match state {
+            Reply::Scanning(shots) => (1, *shots as u16),
+            Reply::Found(_) => (2, self.input[input::SHOTS]),
+            Reply::Works => (3, 0),
+            _ => (0, 0),
+        };
         (self.input[input::STATE], self.input[input::SHOTS]) = (state, shots);
     }
 
-    fn words(&mut self, words: &str) {
-        let room = &mut self.input[input::WORDS..];
-        room.fill(0);
-        for (to, two) in room.iter_mut().zip(words.as_bytes().chunks(2)) {
-            *to = u16::from_be_bytes([two[0], two.get(1).copied().unwrap_or(0)]);
+    /// Puts what a station does into the registers of jobs, if the table has them.
+    pub fn show(&mut self, shown: &Shown, state: &Reply) {
+        if self.jobs {
+            let units = self.scales();
+            shown.put(&mut self.input, units);
+            self.state(state);
         }
-        self.input[input::LENGTH] = words.len() as u16;
     }
+}
+
+/// Whether poses of a notation have registers.
+///
+/// # Errors
+/// The notation is not of six numbers in mm and degrees.
+pub fn has_registers(notation: Convention) -> Result<()> {
+    Registers::new(notation, Duration::ZERO, 0, true).map(|_| ())
 }
 
 /// The request number that follows this one: 1 to 65535, then 1 again.
@@ -265,7 +264,11 @@ mod tests {
     const OTHER: IpAddr = IpAddr::V4(std::net::Ipv4Addr::new(10, 0, 0, 3));
 
     fn after(answered: u16) -> Registers {
-        Registers::new(Convention::Denso, Duration::from_secs(10), answered).unwrap()
+        Registers::new(Convention::Denso, Duration::from_secs(10), answered, false).unwrap()
+    }
+
+    fn with_jobs() -> Registers {
+        Registers::new(Convention::Denso, Duration::from_secs(10), 0, true).unwrap()
     }
 
     fn registers() -> Registers {
@@ -296,7 +299,7 @@ mod tests {
         assert_eq!(r.write(4, &pose, PLC, now), Ok(None));
         let asked = r.write(0, &[1, 2], PLC, now).unwrap().unwrap();
         let told = [300.0, -20.0, 420.0, 180.0, -0.0001, 90.0].to_vec();
-        assert_eq!(asked, Asked { number: 1, request: Ok(Request::Pose(told)), by_another: false });
+        assert_eq!(asked, Asked { number: 1, request: Ok(Request::Pose(told)), from: PLC, by_another: false });
         r.answer(1, &Ok(Reply::Shots(7)), &Reply::Scanning(7));
         assert_eq!(r.read(2, 5), Ok(vec![0, 1, 0, 1, 7]));
         assert_eq!(r.write(16, &[0x6c65, 0x6400], PLC, now), Ok(None));
@@ -366,9 +369,45 @@ mod tests {
     }
 
     #[test]
+    fn a_station_has_further_requests_and_registers() {
+        let (mut r, mut plain, now) = (with_jobs(), registers(), Instant::now());
+        assert_eq!(r.write(16, &[0x6c65, 0x6400], PLC, now), Ok(None));
+        let insert = |r: &mut Registers, number, sweep: [u16; 2]| {
+            assert_eq!(r.write(36, &sweep, PLC, now), Ok(None));
+            let asked = r.write(0, &[number, 5], PLC, now).unwrap().unwrap();
+            r.answer(number, &Ok(Reply::Ordered("0001-insert".into())), &Reply::Works);
+            asked.request
+        };
+        let of = |sweep_mm| Ok(Request::Insert { recipe: "led".into(), sweep_mm });
+        assert_eq!(insert(&mut r, 1, [0, 0]), of(None), "0: the program chooses");
+        assert_eq!(insert(&mut r, 2, [0, 30_500]), of(Some(30.5)));
+        assert_eq!(insert(&mut r, 3, [65535, 65535]), of(Some(-0.001)), "the job refuses it");
+        assert_eq!(r.read(4, 2), Ok(vec![0, 3]));
+        assert_eq!(r.write(0, &[4, 6], PLC, now).unwrap().unwrap().request, Ok(Request::Stop));
+        assert_eq!(r.read(254, 1), Ok(vec![0]));
+        assert_eq!((r.read(255, 1), r.write(38, &[1], PLC, now)), (Err(Refused::Address), Err(Refused::Address)));
+        let said = plain.write(0, &[1, 5], PLC, now).unwrap().unwrap().request.unwrap_err();
+        assert_eq!(said.words, "register 1 is 5; 1 SCAN, 2 POSE, 3 FIND and 4 GIVE are requests");
+    }
+
+    /// What is shown of a job is no answer to a request, and an answer changes nothing of the job.
+    #[test]
+    fn jobs_and_answers_have_registers_of_their_own() {
+        let (mut r, now) = (with_jobs(), Instant::now());
+        r.write(0, &[1, 4], PLC, now).unwrap().unwrap();
+        let shown = Shown { ended: 7, ..Shown::default() };
+        r.show(&shown, &Reply::Works);
+        assert_eq!((r.read(2, 4), r.read(129, 1)), (Ok(vec![1, 0, 0, 3]), Ok(vec![7])));
+        r.answer(1, &Ok(Reply::Pose(vec![1.0; 6])), &Reply::Found("led".into()));
+        assert_eq!((r.read(2, 4), r.read(129, 1)), (Ok(vec![0, 1, 0, 2]), Ok(vec![7])));
+        r.show(&Shown::default(), &Reply::Found("led".into()));
+        assert_eq!((r.read(8, 2), r.read(129, 1)), (Ok(vec![0, 1000]), Ok(vec![0])));
+    }
+
+    #[test]
     fn poses_in_other_units_are_refused() {
         for other in [Convention::Ur, Convention::Abb, Convention::Matrix] {
-            let said = Registers::new(other, Duration::ZERO, 0).err().unwrap();
+            let said = Registers::new(other, Duration::ZERO, 0, false).err().unwrap();
             assert!(said.what.starts_with("Modbus has no registers for poses in the notation"), "{said}");
         }
     }

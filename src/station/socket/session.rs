@@ -2,6 +2,8 @@
 //! and its answer.
 //! Frame and unit: base_from_flange as the notation has it, mm here; tool 0 and work frame 0 on the controller.
 
+use super::executor::Executor;
+use super::part::Part;
 use super::words::{self, Code, Of, Reply, Request, Which, Wrong};
 use crate::arm::TimedPose;
 use crate::capture::PictureSource;
@@ -96,11 +98,6 @@ impl Session {
         said.map_or_else(|wrong| words::no(&wrong), |reply| words::yes(&reply, self.options.notation))
     }
 
-    /// Notation of all poses.
-    pub fn notation(&self) -> Convention {
-        self.options.notation
-    }
-
     /// Executes a request.
     ///
     /// # Errors
@@ -113,6 +110,9 @@ impl Session {
             Request::Pose(numbers) => self.shot(&numbers),
             Request::Find(name) => self.find(&name),
             Request::Give(which, of) => self.give(which, of),
+            Request::Insert { .. } | Request::Stop => {
+                Err(Wrong::new(Code::Word, "here the robot's own program moves it: SCAN, POSE, FIND and GIVE"))
+            }
             Request::Bye => Ok(Reply::Bye),
         }
     }
@@ -206,24 +206,25 @@ impl Session {
     }
 
     fn give(&self, which: Which, of: Of) -> Said {
-        let Some(poses) = self.found.as_ref().and_then(|f| f.poses.as_ref()) else {
+        let Some(found) = self.found.as_ref() else {
             return Err(Wrong::new(Code::Order, "nothing was found yet: SCAN, POSE at each stop, FIND, then GIVE"));
         };
-        let pose = match which {
-            Which::Approach => &poses.approach,
-            Which::Insertion => &poses.insertion,
-            Which::Retract => &poses.retract,
-        };
-        let notation = self.options.notation;
-        match (of, self.settings.tool) {
-            (Of::Tool, _) => Ok(Reply::Pose(notation.write(&pose.base_from_tool))),
-            (Of::Flange, Some(tool)) => {
-                Ok(Reply::Pose(notation.write(&(pose.base_from_tool * tool.flange_from_tool.inverse()))))
-            }
-            (Of::Flange, None) => {
-                Err(Wrong::new(Code::Failed, "station.toml has no [tool]: where the flange stands is not known"))
-            }
-        }
+        Part::of(found).give(which, of, self.settings.tool, self.options.notation).map(Reply::Pose)
+    }
+}
+
+impl Executor for Session {
+    fn notation(&self) -> Convention {
+        self.options.notation
+    }
+    fn afresh(&mut self) {
+        Session::afresh(self);
+    }
+    fn done(&mut self, request: Request) -> Said {
+        Session::done(self, request)
+    }
+    fn state(&mut self) -> Reply {
+        self.status()
     }
 }
 

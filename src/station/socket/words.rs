@@ -23,6 +23,15 @@ pub enum Request {
     Find(String),
     /// Asks for a pose of the found part.
     Give(Which, Of),
+    /// Orders an insertion by a station that moves the robot itself; only over registers.
+    Insert {
+        /// The recipe.
+        recipe: String,
+        /// Length of the sweep, mm; `None`: the program chooses it.
+        sweep_mm: Option<f64>,
+    },
+    /// Stops what the station does; only over registers.
+    Stop,
     /// Ends the connection.
     Bye,
 }
@@ -44,6 +53,12 @@ pub enum Reply {
     Score(f64),
     /// A pose in the session's notation.
     Pose(Vec<f64>),
+    /// A job of this name was ordered.
+    Ordered(String),
+    /// A job runs.
+    Works,
+    /// What ran or waited was stopped.
+    Stopped,
     /// The connection ends.
     Bye,
 }
@@ -81,12 +96,26 @@ pub enum Code {
     Refused = 4,
     /// A fault on our side, for example no picture or a full disk.
     Failed = 5,
-    /// Another robot is connected.
+    /// Another robot is connected, or a job runs or waits.
     Busy = 6,
     /// A line that is too long.
     Long = 7,
     /// Nothing was received for too long.
     Late = 8,
+    /// The robot of a station is not armed.
+    Unarmed = 9,
+    /// No screen operates, or not the one that armed the robot.
+    Unattended = 10,
+    /// A person has to look at the robot first.
+    Look = 11,
+    /// STOP was pressed, or the job was ended.
+    Stopped = 12,
+    /// A result could not be written.
+    Full = 13,
+    /// The station or the request lacks something, or contradicts itself.
+    Station = 14,
+    /// The program ended while the job ran.
+    CutOff = 15,
 }
 
 /// An error in a request.
@@ -195,6 +224,9 @@ pub fn yes(reply: &Reply, notation: Convention) -> String {
         Reply::Shots(shots) => shots.to_string(),
         Reply::Score(score) => format!("{score:.3}"),
         Reply::Pose(numbers) => pose(notation, numbers),
+        Reply::Ordered(job) => format!("ordered {job}"),
+        Reply::Works => "works".into(),
+        Reply::Stopped => "stopped".into(),
         Reply::Bye => "bye".into(),
     };
     format!("OK {words}")
