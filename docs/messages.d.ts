@@ -1265,25 +1265,37 @@ bytes: number, };
 
 export type Connection = { 
 /**
- * mqtt.
+ * mqtt: this program connects to a broker; modbus: PLCs connect to it.
  */
 door: string, 
 /**
- * Address of the other program.
+ * Address of the broker, or the address that is listened on.
  */
 address: string, 
 /**
- * Why it is not connected; null if it is.
+ * Why the door is not open; null if it is.
  */
 problem: string | null, 
 /**
- * Messages that were handed over since the start.
+ * The other programs that are connected now.
+ */
+peers: Array<string>, 
+/**
+ * Messages that were handed over, or frames that were answered, since the start.
  */
 sent: number, 
 /**
- * Messages that were not, because too many waited.
+ * Messages that were not, because too many waited; frames, requests and connections that were refused.
  */
-lost: number, };
+lost: number, 
+/**
+ * Growth of `sent` over the last ten seconds, 1/s.
+ */
+rate_hz: number, 
+/**
+ * The last problem or refusal; null if there was none.
+ */
+last_error: string | null, };
 
 export type SettingsState = { 
 /**

@@ -18,6 +18,8 @@ mod guard;
 mod job;
 #[path = "cell/lasers.rs"]
 mod lasers;
+#[path = "cell/plc.rs"]
+mod plc;
 #[path = "cell/programs.rs"]
 mod programs;
 #[path = "cell/refusals.rs"]

@@ -102,6 +102,15 @@ fn state_and_results_reach_a_broker_which_orders_nothing() {
     python("tests/web/broker.py", &[program(), dir.path().to_str().unwrap()]);
 }
 
+#[test]
+fn a_plc_starts_and_follows_insertions_that_only_the_screen_confirms() {
+    let [cell, recorded] = [tempfile::tempdir().unwrap(), copy()];
+    // The long form inserts every part, and sends more random frames.
+    let (parts, frames) = if long() { ("led,osc,flash,dimm", "1000") } else { ("osc", "20") };
+    let [folder, recorded] = [&cell, &recorded].map(|dir| dir.path().to_str().unwrap());
+    python("tests/web/plc.py", &[program(), folder, recorded, parts, "20", if long() { "0" } else { "30" }, frames]);
+}
+
 /// Whether the long forms run.
 fn long() -> bool {
     std::env::var_os("SHEETLIGHT_LONG").is_some()

@@ -142,7 +142,7 @@ impl Screen {
         alarms.extend(camera.as_ref().and_then(|c| c.2.clone()));
         let robot = self.robot().map(|r| r.seen()).unwrap_or_default();
         alarms.extend(robot.wrong.clone());
-        alarms.extend(self.hub.broker().and_then(|link| link.problem));
+        alarms.extend(self.hub.links().into_iter().filter_map(|link| link.problem));
         let motion = self.desk.state();
         alarms.extend(motion.look.iter().map(|why| format!("look at the robot: {why}")));
         let cut = self.jobs.list(JOBS).iter().filter(|j| j.state == JobState::CutOff).count();

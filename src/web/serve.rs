@@ -8,6 +8,7 @@ use super::event::{Broker, Hub, publish};
 use super::guard::{Door, Doorway, Hosts, Peer, Sessions, Tries, door, tls, verify};
 use super::message::Event;
 use super::motion::{Desk, Links, SimulatedRobot};
+use super::plc;
 use super::port::listen;
 use super::robot::Robot;
 use super::screen::Screen;
@@ -18,7 +19,7 @@ use crate::files::Lock;
 use crate::station::settle_restore;
 use crate::web::message::Mode;
 use axum::middleware::from_fn_with_state;
-use std::net::IpAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -65,8 +66,20 @@ pub struct ServeOptions {
     pub metrics: Option<String>,
     /// Where state and results are published.
     pub mqtt: Option<Broker>,
+    /// Address at which PLCs may ask for jobs over Modbus TCP, which has no login; port 0: any free one.
+    pub modbus: Option<SocketAddr>,
     /// Ends the server when it is set.
     pub stop: Arc<AtomicBool>,
+}
+
+/// What a person must know of a server that has started.
+pub struct Opened<'a> {
+    /// The address to open, with the token of this start after `#`.
+    pub url: &'a str,
+    /// Why the port is not the requested one.
+    pub instead: Option<&'a str>,
+    /// Address of the registers for a PLC.
+    pub modbus: Option<SocketAddr>,
 }
 
 /// Interval at which the server checks whether to end.
@@ -75,8 +88,7 @@ const LOOK: Duration = Duration::from_millis(100);
 const BAR: Duration = Duration::from_secs(1);
 
 /// Serves until `stop`. `simulated` is the cell to which robot and camera belong, if they are simulated. `ready`
-/// gets the address to open, with the token of this start after `#`, and the reason if the port is not the
-/// requested one.
+/// is called when everything that was asked for is open.
 ///
 /// # Errors
 /// An invalid station or one that another server uses, an address that is unavailable or unprotected, invalid TLS
@@ -85,7 +97,7 @@ pub fn serve(
     options: &ServeOptions,
     simulated: Option<SimulatedRobot>,
     token: &str,
-    ready: impl FnOnce(&str, Option<&str>) -> Result<()>,
+    ready: impl FnOnce(&Opened) -> Result<()>,
 ) -> Result<()> {
     check(options)?;
     let place = Place { station: options.station.clone(), recordings: options.recordings.clone(), mode: options.mode };
@@ -151,7 +163,7 @@ async fn run(
     options: &ServeOptions,
     token: &str,
     jobs: Arc<Jobs>,
-    ready: impl FnOnce(&str, Option<&str>) -> Result<()>,
+    ready: impl FnOnce(&Opened) -> Result<()>,
 ) -> Result<()> {
     let (listener, instead) = listen(options.address, options.port, options.next_free).await?;
     let address = listener.local_addr().map_err(lost)?;
@@ -173,8 +185,11 @@ async fn run(
     if let Some(broker) = options.mqtt.clone() {
         tokio::spawn(publish(broker, screen.hub.clone()));
     }
+    // Before anybody is told of it: an address that is not available ends the start. It closes with this function.
+    let plcs = options.modbus.map(|at| plc::Door::open(at, screen.clone())).transpose()?;
     tokio::spawn(bars(screen));
-    ready(&format!("{url}/#token={token}"), instead.as_deref())?;
+    let modbus = plcs.as_ref().map(|door| door.address);
+    ready(&Opened { url: &format!("{url}/#token={token}"), instead: instead.as_deref(), modbus })?;
     let stop = options.stop.clone();
     let asked = async move {
         while !stop.load(Ordering::Relaxed) {
@@ -302,6 +317,7 @@ mod tests {
             secured: None,
             metrics: None,
             mqtt: None,
+            modbus: None,
             stop: Arc::default(),
         };
         let links = Links {
@@ -316,8 +332,8 @@ mod tests {
         let jobs = Jobs::open(place, hub, desk.clone()).unwrap();
         let (runtime, (tell, told)) = (runtime().unwrap(), channel());
         runtime.spawn(async move {
-            let ready = |url: &str, _: Option<&str>| {
-                tell.send(url.to_owned()).unwrap();
+            let ready = |opened: &Opened| {
+                tell.send(opened.url.to_owned()).unwrap();
                 Ok(())
             };
             run(&options, "token", jobs, ready).await.unwrap();

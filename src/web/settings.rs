@@ -32,7 +32,7 @@ pub fn state(screen: &Screen) -> Result<SettingsState> {
         folder: shown(&place.station),
         recordings: shown(&place.recordings),
         secured: screen.password.is_some(),
-        connections: screen.hub.broker().into_iter().collect(),
+        connections: screen.hub.links(),
         backups: listed(screen),
     })
 }

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 
 /// What goes wrong.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Fault {
+pub enum Fault {
     Cut,
     Lost,
     Late,
@@ -30,7 +30,7 @@ enum Fault {
     TakenByAnother,
 }
 
-const FAULTS: [Fault; 11] = [
+pub const FAULTS: [Fault; 11] = [
     Fault::Cut,
     Fault::Lost,
     Fault::Late,
@@ -45,7 +45,7 @@ const FAULTS: [Fault; 11] = [
 ];
 
 /// Motions of a whole job before its scan, and after it: approach, down to it, insertion, retract.
-const BEFORE: usize = 7;
+pub const BEFORE: usize = 7;
 const AFTER: usize = 4;
 /// A job that has not ended by then hangs.
 const PATIENCE: Duration = Duration::from_secs(180);
@@ -89,7 +89,9 @@ fn wait(set: &Set, child: &mut Child, moves: usize, then_ms: u64) {
     std::thread::sleep(Duration::from_millis(then_ms));
 }
 
-fn breaks(fault: Fault, set: &Set, child: &mut Child, rng: &mut Pcg64) {
+/// Something goes wrong with the cell, or with the process that has its robot.
+pub fn breaks(fault: Fault, set: &Set, process: u32, rng: &mut Pcg64) {
+    let signal = |name: &str| drop(Command::new("kill").args([name, &process.to_string()]).status());
     let (faults, controller) = (&set.served.faults, &set.served.controller);
     match fault {
         Fault::Cut => faults.cut.store(1, SeqCst),
@@ -101,10 +103,8 @@ fn breaks(fault: Fault, set: &Set, child: &mut Child, rng: &mut Pcg64) {
         }
         Fault::CameraOut => faults.camera_gone.store(true, SeqCst),
         Fault::EmergencyStop => controller.emergency_stop(),
-        Fault::Killed => child.kill().unwrap(),
-        Fault::Interrupted => {
-            let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
-        }
+        Fault::Killed => signal("-KILL"),
+        Fault::Interrupted => signal("-INT"),
         Fault::ControllerGone => faults.gone.store(true, SeqCst),
         Fault::DiskFull => {}
         Fault::TeachMode => controller.set_mode(2),
@@ -194,7 +194,7 @@ fn one(seed: u64, fault: Fault, whole: usize) -> (String, Phase) {
     let most_kb = (fault == Fault::DiskFull).then(|| [2, 4, 8, 40, 100, 150, 200, 400, 1000][rng.random_range(0..9)]);
     let mut child = begin(&set, most_kb);
     wait(&set, &mut child, moves, then_ms);
-    breaks(fault, &set, &mut child, &mut rng);
+    breaks(fault, &set, child.id(), &mut rng);
     let mut code = end(&mut child);
     let job = set.dir.path().join("job");
     let state = || JobState::load(&job).expect("job.json is whole");
@@ -243,7 +243,7 @@ fn writeln(set: &Set, line: &str) -> std::io::Result<()> {
 }
 
 /// Nothing was hit or let go elsewhere, the arm stands, and all that it did was confirmed.
-fn safe(set: &Set, seed: u64, first: &str) {
+pub fn safe(set: &Set, seed: u64, first: &str) {
     let said = || std::fs::read_to_string(set.dir.path().join("said")).unwrap_or_default();
     assert!(stands(set), "seed {seed}, {first}: the arm moves on\n{}", said());
     let log = set.served.cell.log();

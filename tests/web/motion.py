@@ -14,11 +14,11 @@ import threading
 import time
 
 import stalls
-from server import Server, events, frame, say
+from hands import HELD, Operator
+from server import Server, events, say
 from waits import PATIENCE, until
 
 program, folder, second = sys.argv[1:4]
-HELD = 0.9
 METER = stalls.Meter()
 RAN_OUT = "lease ran out"
 
@@ -60,87 +60,6 @@ def judged(ended):
         if METER.longest > stalls.LONG and (isinstance(e, Late) or RAN_OUT in ended()):
             raise stalls.Stalled(f"the machine stood still for {METER.longest:.2f} s: {e}") from None
         raise
-
-
-class Operator:
-    """A tab with its socket, which acts as a page does."""
-
-    def __init__(self, s, tab="tests", session=None):
-        self.s, self.tab = s, tab
-        status, self.socket = s.socket(tab=tab)
-        assert status == 101, status
-        threading.Thread(target=self.listen, daemon=True).start()
-
-    def listen(self):
-        try:
-            while True:
-                frame(self.socket)
-        except (AssertionError, OSError):
-            pass
-
-    def post(self, path, body=None):
-        return self.s.ask("POST", "/api/v1" + path, body or {}, tab=self.tab)
-
-    def asked(self, step):
-        def waits():
-            m = self.s.json("GET", "/motion")
-            job = self.s.json("GET", "/jobs")[0]
-            assert job["state"] in ("queued", "running"), f"{step} was not asked for: {m}, {job}"
-            return {"job": m["asked"]["job"], "hash": m["asked"]["hash"]} if m["asked"] and not m["moving"] and step == m["asked"]["step"] else None
-
-        return until(step, waits)
-
-    def begin(self):
-        """Arms the robot, confirms the look at it, and orders a job. Returns the job, which then proposes its first motion."""
-        self.s.json("POST", "/lease", {"firmly": True}, tab=self.tab)
-        self.s.json("POST", "/robot", {"armed": True}, tab=self.tab)
-        self.s.json("POST", "/robot/looked", tab=self.tab)
-        return self.s.json("POST", "/jobs", {"procedure": "insert", "recipe": "osc", "sweep_mm": 20}, tab=self.tab)["id"]
-
-    def press(self, what):
-        status, _, body = self.post("/motion/press", what)
-        assert status == 200, (status, body)
-        return json.loads(body)["grant"]
-
-    def go(self, what):
-        """Presses, holds and confirms. From then on the caller must report that the button is held."""
-        grant = self.press(what)
-        time.sleep(HELD)
-        status, _, body = self.post("/motion/go", {"grant": grant, "what": what})
-        assert status == 200, (status, body)
-        return grant
-
-    @contextlib.contextmanager
-    def holding(self, grant):
-        """Reports the held button while other requests run, which may take longer than the button may be silent."""
-        over = threading.Event()
-
-        def talk():
-            while not over.wait(0.1):
-                say(self.socket, f"held {grant}")
-
-        talker = threading.Thread(target=talk, daemon=True)
-        talker.start()
-        try:
-            yield
-        finally:
-            over.set()
-            talker.join()
-            say(self.socket, f"held {grant}")
-
-    def moves(self, job, grant, where=folder):
-        """Holds the button until the arm moves."""
-        with self.holding(grant):
-            until("that it moves", lambda: moving(where) or self.s.json("GET", f"/jobs/{job}")["state"] != "running")
-        job = self.s.json("GET", f"/jobs/{job}")
-        assert job["state"] == "running", job
-
-
-def moving(where):
-    """Whether the arm moves now."""
-    log = events(where)
-    last = [e["what"] for e in log if e["what"] in ("move", "arrived", "halt")]
-    return bool(last) and last[-1] == "move"
 
 
 def nothing_moves(s, former):
@@ -251,7 +170,7 @@ def halts(s):
         what = a.asked("touch")
         with judged(lambda: why(s.ended(job))):
             grant = a.go(what)
-            a.moves(job, grant)
+            a.moves(job, grant, folder)
             with a.holding(grant):
                 refused("the same again", a.post("/motion/go", {"grant": grant, "what": what}))
                 refused("a press while it moves", a.post("/motion/press", what))

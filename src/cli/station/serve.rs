@@ -11,7 +11,7 @@ use crate::web::{
     Broker, Mode, Secured, ServeOptions, SimulatedOptions, SimulatedRobot, hashed, random_hex, serve, simulated,
 };
 use std::io::{BufRead, IsTerminal};
-use std::net::{IpAddr, Ipv4Addr};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 
 /// Serve the operator's screen to a browser
@@ -93,6 +93,9 @@ pub struct Serve {
     /// PEM certificates that sign the broker's [default: the system's]
     #[arg(long, value_name = "FILE", requires = "mqtt")]
     mqtt_ca: Option<PathBuf>,
+    /// Registers for a PLC (Modbus TCP, no login): PORT of this machine, or ADDRESS:PORT
+    #[arg(long, value_name = "ADDR", value_parser = modbus)]
+    modbus: Option<SocketAddr>,
     /// Name by which browsers call this machine; may be repeated
     #[arg(long = "name", requires = "password_file")]
     names: Vec<String>,
@@ -144,15 +147,31 @@ pub fn run(args: &Serve, console: &Console) -> Result<()> {
         secured,
         metrics: args.metrics_token_file.as_deref().map(metrics_token).transpose()?,
         mqtt: broker(args)?,
+        modbus: args.modbus,
         stop: interrupt::asked_for(),
     };
-    serve(&options, cell, &random_hex(), |url, instead| {
-        instead.into_iter().for_each(|why| console.warn(why));
-        let said =
+    serve(&options, cell, &random_hex(), |opened| {
+        opened.instead.into_iter().for_each(|why| console.warn(why));
+        if let Some(at) = opened.modbus.filter(|at| !at.ip().is_loopback()) {
+            console.warn(format!("anybody who reaches {at} can ask for jobs and stop them: Modbus has no login"));
+        }
+        let url = opened.url;
+        let mut told = serde_json::json!({ "url": url });
+        let mut said =
             format!("open {url}\nthe address holds the token of this start; Ctrl-C ends the screen, jobs are kept");
-        console.result(&serde_json::json!({ "url": url }), &said);
+        if let Some(at) = opened.modbus {
+            told["modbus"] = at.to_string().into();
+            said += &format!("\nregisters for a PLC: Modbus TCP at {at}");
+        }
+        console.result(&told, &said);
         console.finish()
     })
+}
+
+/// The address of `--modbus`; a port alone is one of this machine that others do not reach.
+fn modbus(text: &str) -> std::result::Result<SocketAddr, String> {
+    let port = text.parse::<u16>().map(|port| SocketAddr::from((Ipv4Addr::LOCALHOST, port)));
+    port.or_else(|_| text.parse()).map_err(|_| "wanted PORT or ADDRESS:PORT, e.g. 5020 or 192.168.0.10:502".into())
 }
 
 /// Most bytes of a file with certificates: those of a system have 0.3 MB.

@@ -3,7 +3,9 @@
 
 use super::answer::{Answer, beside};
 use crate::capture::metrics::{MEDIA, Metrics};
+use crate::web::event::MQTT;
 use crate::web::message::{Job, RobotState};
+use crate::web::plc::MODBUS;
 use crate::web::screen::Screen;
 use axum::extract::State;
 use axum::http::header;
@@ -47,8 +49,15 @@ fn text(screen: &Screen) -> String {
     m.one(("sheetlight_job_running", "gauge"), "1 while a job runs.", Some(u8::from(bar.running.is_some())));
     m.one(("sheetlight_alarms", "gauge"), "Alarms that the bar shows.", Some(bar.alarms.len()));
 
-    let broker = screen.hub.broker().map(|link| u8::from(link.problem.is_none()));
+    let links = screen.hub.links();
+    let of = |door: &str| links.iter().find(|link| link.door == door);
+    let broker = of(MQTT).map(|link| u8::from(link.problem.is_none()));
     m.one(("sheetlight_mqtt_connected", "gauge"), "1 while the MQTT broker is connected.", broker);
+    let plcs = of(MODBUS).map(|link| link.peers.len());
+    m.one(("sheetlight_modbus_peers", "gauge"), "Connections of Modbus that are open.", plcs);
+    let frames = [("answered", of(MODBUS).map(|l| l.sent)), ("refused", of(MODBUS).map(|l| l.lost))];
+    let frames = frames.into_iter().filter_map(|(result, n)| n.map(|n| (vec![("result", result)], n)));
+    m.family(("sheetlight_modbus_frames_total", "counter"), "Frames over Modbus by result.", frames);
     let linked = u8::from(bar.robot != RobotState::NoLink);
     m.one(("sheetlight_robot_linked", "gauge"), "1 while the robot answers.", Some(linked));
     let armed = u8::from(matches!(bar.robot, RobotState::Armed | RobotState::Moving));

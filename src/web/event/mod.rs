@@ -6,10 +6,11 @@ mod broker;
 mod growing;
 mod hub;
 mod mqtt;
+mod rate;
 mod socket;
 
 pub use broker::Broker;
 pub use growing::Growing;
 pub use hub::Hub;
-pub use mqtt::publish;
+pub use mqtt::{DOOR as MQTT, publish};
 pub use socket::stream;

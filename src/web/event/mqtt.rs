@@ -15,11 +15,14 @@ const WAITING: usize = 64;
 /// First and longest wait before the next attempt to connect.
 const AGAIN: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(30)];
 
+/// Name of this door among the links.
+pub const DOOR: &str = "mqtt";
+
 /// Publishes until the server ends. A slow or missing broker delays nothing.
 pub async fn publish(broker: Broker, hub: Arc<Hub>) {
     let events = hub.listen();
     let (client, connection) = AsyncClient::new(broker.options(), WAITING);
-    hub.link(|link| {
+    hub.link(DOOR, |link| {
         link.address = broker.name();
         link.problem = Some(format!("{} was not reached yet", broker.name()));
     });
@@ -32,13 +35,19 @@ async fn hold(broker: &Broker, hub: &Hub, client: &AsyncClient, mut connection: 
     loop {
         match connection.poll().await {
             Ok(Event::Incoming(Packet::ConnAck(_))) => {
-                hub.link(|link| link.problem = None);
+                hub.link(DOOR, |link| {
+                    link.problem = None;
+                    link.peers = vec![broker.name()];
+                });
                 wait = AGAIN[0];
                 let _ = client.try_publish(broker.topic("state"), QoS::AtLeastOnce, true, "online");
             }
             Ok(_) => {}
             Err(e) => {
-                hub.link(|link| link.problem = Some(format!("{} does not answer: {e}", broker.name())));
+                hub.link(DOOR, |link| {
+                    link.problem = Some(format!("{} does not answer: {e}", broker.name()));
+                    link.peers.clear();
+                });
                 tokio::time::sleep(wait).await;
                 wait = (2 * wait).min(AGAIN[1]);
             }
@@ -55,7 +64,7 @@ async fn pass_on(broker: &Broker, hub: &Hub, client: &AsyncClient, mut events: R
                 for message in states.messages(&serde_json::from_str(&text).expect("the hub's own text")) {
                     let (topic, qos) = (broker.topic(&message.topic), QoS::AtLeastOnce);
                     let handed = client.try_publish(topic, qos, message.kept, message.text).is_ok();
-                    hub.link(|link| if handed { link.sent += 1 } else { link.lost += 1 });
+                    hub.link(DOOR, |link| if handed { link.sent += 1 } else { link.lost += 1 });
                 }
             }
             Err(RecvError::Lagged(_)) => {}

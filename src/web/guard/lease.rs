@@ -70,6 +70,12 @@ impl Leases {
         }
     }
 
+    /// Whether this tab operates; its lease is not renewed.
+    pub fn holds(&self, tab: &Tab) -> bool {
+        let held = self.0.lock().unwrap_or_else(|e| e.into_inner());
+        held.as_ref().is_some_and(|h| h.tab == *tab && h.used.elapsed() < IDLE)
+    }
+
     /// Releases the lease.
     pub fn release(&self, tab: &Tab) {
         let mut held = self.0.lock().unwrap_or_else(|e| e.into_inner());
@@ -111,8 +117,10 @@ mod tests {
         assert!(leases.need(&tab("a")).is_err());
         // A tab of the same name in another session is another tab.
         assert!(leases.need(&Tab { session: "t".into(), tab: "b".into() }).is_err());
+        assert!(leases.holds(&tab("b")) && !leases.holds(&tab("a")));
         // Idle for longer than a minute.
         leases.0.lock().unwrap().as_mut().unwrap().used -= IDLE;
+        assert!(!leases.holds(&tab("b")));
         assert!(leases.need(&tab("b")).is_err() && leases.state().holder.is_none());
         leases.take(&tab("a"), false).unwrap();
     }

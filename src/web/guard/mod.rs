@@ -14,9 +14,7 @@ mod tries;
 
 pub use door::{Door, MOST_BODY, door};
 pub use host::Hosts;
-#[cfg(test)]
-pub use lease::IDLE;
-pub use lease::{Leases, Tab};
+pub use lease::{IDLE, Leases, Tab};
 pub use names::{plain, resolve};
 pub use password::{hashed, verify};
 pub use session::{Sessions, random_hex};

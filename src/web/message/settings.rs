@@ -32,18 +32,24 @@ pub struct SettingsState {
 /// A link to another program.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, TS)]
 pub struct Connection {
-    /// mqtt.
+    /// mqtt: this program connects to a broker; modbus: PLCs connect to it.
     pub door: String,
-    /// Address of the other program.
+    /// Address of the broker, or the address that is listened on.
     pub address: String,
-    /// Why it is not connected; null if it is.
+    /// Why the door is not open; null if it is.
     pub problem: Option<String>,
-    /// Messages that were handed over since the start.
+    /// The other programs that are connected now.
+    pub peers: Vec<String>,
+    /// Messages that were handed over, or frames that were answered, since the start.
     #[ts(type = "number")]
     pub sent: u64,
-    /// Messages that were not, because too many waited.
+    /// Messages that were not, because too many waited; frames, requests and connections that were refused.
     #[ts(type = "number")]
     pub lost: u64,
+    /// Growth of `sent` over the last ten seconds, 1/s.
+    pub rate_hz: f64,
+    /// The last problem or refusal; null if there was none.
+    pub last_error: Option<String>,
 }
 
 /// A backup in the station's folder `backups`.

@@ -114,6 +114,12 @@ impl Desk {
         self.at().armed()
     }
 
+    /// The tab that armed the robot; `None`: it is not armed, or another tab has taken over since.
+    pub fn armed_by(&self) -> Option<Tab> {
+        let at = self.at();
+        at.by.clone().filter(|_| at.armed())
+    }
+
     /// Takes the guard for a job, or for a request (`None`), until [`Desk::back`]; `stop` ends it.
     ///
     /// # Errors

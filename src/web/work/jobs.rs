@@ -122,6 +122,30 @@ impl Jobs {
     /// Accepts an order. Returns an error if too many jobs wait, or if the record cannot be written.
     pub fn order(&self, order: Order) -> Result<Job> {
         let _pen = self.pen();
+        self.ordered(order)
+    }
+
+    /// The same, if no job runs or waits.
+    ///
+    /// # Errors
+    /// A job runs or waits, of kind refused; the record cannot be written.
+    pub fn order_alone(&self, order: Order) -> Result<Job> {
+        let _pen = self.pen();
+        if let Some(busy) = self.busy() {
+            return Err(Fault::refused(format!("{busy} runs or waits")).next("wait until it has ended, or stop it"));
+        }
+        self.ordered(order)
+    }
+
+    /// A job that runs or waits.
+    pub fn busy(&self) -> Option<String> {
+        let state = self.state();
+        let number = state.running.as_ref().map(|r| r.number).or(state.waiting.front().copied())?;
+        state.all.get(&number).map(|job| job.id.clone())
+    }
+
+    /// Writes and queues an order; the caller holds the pen.
+    fn ordered(&self, order: Order) -> Result<Job> {
         let state = self.state();
         if state.waiting.len() >= MOST_WAITING {
             return Err(
@@ -425,6 +449,26 @@ mod tests {
             assert_eq!(jobs.folder(&job).exists(), resumed);
             assert_eq!(jobs.state().waiting.pop_front().is_some(), resumed);
         }
+    }
+
+    /// An order that must be alone is refused while another job waits or runs.
+    #[test]
+    fn an_order_that_must_be_alone_is_alone() {
+        let dir = tempfile::tempdir().unwrap();
+        let jobs = jobs(dir.path());
+        let first = jobs.order_alone(Order::Check(Plain {})).unwrap();
+        let refused = |jobs: &Jobs| jobs.order_alone(Order::Check(Plain {})).unwrap_err().what;
+        assert_eq!(refused(&jobs), "0001-check runs or waits");
+        let taken = jobs.take().unwrap();
+        assert_eq!((refused(&jobs).as_str(), jobs.busy()), ("0001-check runs or waits", Some(first.id)));
+        jobs.end(taken.job, false, Err(Fault::refused("over").next("again")), 1.0);
+        let both = std::thread::scope(|scope| {
+            let ask = || scope.spawn(|| jobs.order_alone(Order::Check(Plain {})).is_ok());
+            let both = [ask(), ask()];
+            both.map(|asked| asked.join().unwrap())
+        });
+        assert_eq!(both.iter().filter(|ok| **ok).count(), 1);
+        assert_eq!(jobs.list(10).len(), 2);
     }
 
     #[test]

@@ -1,14 +1,23 @@
 // The only table of texts: English, then German, Chinese, Japanese.
 
 export const TABLE = {
-  "None. --mqtt URI publishes state, jobs and results to a broker.": [
-    "Keine. --mqtt URI veröffentlicht Zustand, Aufträge und Ergebnisse.",
-    "无。--mqtt URI 将状态、任务和结果发布到代理。",
-    "なし。--mqtt URI で状態・ジョブ・結果をブローカーに発行します。"
+  "None. --mqtt URI publishes state, jobs and results; --modbus ADDR serves registers to a PLC.": [
+    "Keine. --mqtt URI veröffentlicht Zustand, Aufträge, Ergebnisse; --modbus ADDR bietet einer SPS Register.",
+    "无。--mqtt URI 发布状态、任务和结果；--modbus ADDR 向 PLC 提供寄存器。",
+    "なし。--mqtt URI は状態・ジョブ・結果を発行し、--modbus ADDR は PLC にレジスターを提供します。"
   ],
   "connected": ["verbunden", "已连接", "接続中"],
-  "Not sent": ["Nicht gesendet", "未发送", "未送信"],
-  "Messages sent": ["Gesendete Meldungen", "已发送消息", "送信数"],
+  "waits for other programs": [
+    "wartet auf andere Programme",
+    "等待其他程序",
+    "他のプログラムを待機中"
+  ],
+  "Door": ["Zugang", "接口", "接続口"],
+  "Connected programs": ["Verbundene Programme", "已连接的程序", "接続中のプログラム"],
+  "Messages": ["Meldungen", "消息数", "メッセージ数"],
+  "Messages a second": ["Meldungen je Sekunde", "每秒消息数", "毎秒のメッセージ数"],
+  "Not sent or refused": ["Nicht gesendet oder abgelehnt", "未发送或被拒绝", "未送信または拒否"],
+  "Last error": ["Letzter Fehler", "最近的错误", "最後のエラー"],
   "Connections": ["Verbindungen", "连接", "接続"],
   "Address": ["Adresse", "地址", "アドレス"],
   "1280×960 has four times the pixels of 640×480. Other machines were measured earlier, with one clean stripe.":

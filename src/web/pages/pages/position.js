@@ -152,7 +152,8 @@ async function insertion(named, job) {
     step: "1",
     placeholder: t("auto"),
   });
-  let follows = () => {};
+  let follows = () => {},
+    watched = null;
   const ended = (j) => {
     const o = j.outcome;
     fill(
@@ -177,6 +178,7 @@ async function insertion(named, job) {
   };
   const watch = (id) => {
     follows();
+    watched = id;
     follows = follow(progress, id, ended);
   };
   const run = () =>
@@ -232,6 +234,10 @@ async function insertion(named, job) {
     ask(asked),
     on("motion", again),
     on("bar", again),
+    // An insertion that another tab or a PLC has ordered is followed too.
+    on("jobs", (j) => {
+      if (j && moves(j) && j.id !== watched && ["queued", "running"].includes(j.state)) watch(j.id);
+    }),
     () => follows(),
     livePicture(live, () => drawn(job)),
   ];

@@ -148,18 +148,40 @@ export async function show(place) {
   return tryOutputs(outputs);
 }
 
-/** Other programs that are sent to, as they were when the page was opened. */
+/** Links to other programs, as they were when the page was opened. */
 function connections(links) {
   if (links.length === 0) {
     return h(
       "p",
       { class: "small quiet" },
-      t("None. --mqtt URI publishes state, jobs and results to a broker."),
+      t(
+        "None. --mqtt URI publishes state, jobs and results; --modbus ADDR serves registers to a PLC.",
+      ),
     );
   }
+  const state = (l) =>
+    l.problem ?? t(l.peers.length > 0 ? "connected" : "waits for other programs");
   return table(
-    [t("Address"), t("State"), t("Messages sent"), t("Not sent")],
-    links.map((l) => [l.address, l.problem ?? t("connected"), String(l.sent), String(l.lost)]),
+    [
+      t("Door"),
+      t("Address"),
+      t("State"),
+      t("Connected programs"),
+      t("Messages"),
+      t("Messages a second"),
+      t("Not sent or refused"),
+      t("Last error"),
+    ],
+    links.map((l) => [
+      { mqtt: "MQTT", modbus: "Modbus TCP" }[l.door] ?? l.door,
+      l.address,
+      state(l),
+      l.peers.join(", ") || "–",
+      String(l.sent),
+      num(l.rate_hz, 1),
+      String(l.lost),
+      l.last_error ?? "–",
+    ]),
   );
 }
 
