@@ -68,7 +68,12 @@ struct Place {
 pub(super) struct Pulled {
     pub line: Arc<Line>,
     pub pulls: Vec<Pull>,
+    /// Shots to those with which this one is compared: about half a stripe's width. Closer ones are shifted alike.
+    pub stride: u32,
 }
+
+/// The largest such stride.
+pub(super) const FARTHEST: usize = MOST / 4;
 
 /// Position of a point along its stripe and across it, px.
 fn in_picture(along: Along, p: &CloudPoint) -> (f32, f32) {
@@ -189,7 +194,7 @@ impl Line {
         let last = around.partition_point(|line| line.shot <= self.shot + reach);
         let near = &around[first..last];
         let pulls = (0..self.points.len()).into_par_iter().with_min_len(64).map(|i| self.pull(i, near)).collect();
-        Pulled { line: self.clone(), pulls }
+        Pulled { line: self.clone(), pulls, stride: (reach / 4).max(1) }
     }
 }
 
