@@ -14,7 +14,7 @@ pub(super) enum Gathered {
     /// went on.
     Waits(Vec<LeftOut>),
     /// The pose is complete: its pictures, the shortest exposure first.
-    Pose(Vec<Box<Paired>>),
+    Pose(Vec<Paired>),
     /// It is one more picture of a pose that is recorded, or of an exposure that is there.
     Spare,
     /// What moves is not where it stood for the others, or its position is unknown.
@@ -24,7 +24,7 @@ pub(super) enum Gathered {
 /// Pictures of the present pose.
 pub(super) struct Gather {
     /// One for each exposure, the shortest first.
-    pictures: Vec<Option<Box<Paired>>>,
+    pictures: Vec<Option<Paired>>,
     still: Still,
     /// Where the pose stands whose pictures are gathered, and the one that was recorded last.
     here: Option<Stand>,
@@ -44,7 +44,7 @@ impl Gather {
     }
 
     /// Takes a picture with exposure `index`.
-    pub fn take(&mut self, shot: Box<Paired>, index: usize) -> Gathered {
+    pub fn take(&mut self, shot: Paired, index: usize) -> Gathered {
         let Some(stand) = shot.stand else {
             let (id, host_ns) = (shot.picture.id, shot.picture.host_ns);
             return Gathered::Unknown(LeftOut { id, host_ns, why: "no pose is known".into() });
@@ -76,7 +76,7 @@ impl Gather {
     pub fn leave(&mut self, why: &str) -> Vec<LeftOut> {
         self.here = None;
         let (kept, all) = (self.kept(), self.pictures.len());
-        let left = |p: Box<Paired>| {
+        let left = |p: Paired| {
             let why = format!("{why} after {kept} of {all} exposures");
             LeftOut { id: p.picture.id, host_ns: p.picture.host_ns, why }
         };

@@ -97,7 +97,7 @@ impl Run<'_> {
     /// Takes a picture; gives what is to be told. `Err` ends the recording.
     fn take(&mut self, stream: &Stream, shot: Box<Paired>) -> Result<Option<String>> {
         let index = self.exposures.index(shot.picture.exposure_ns.unwrap_or(0));
-        match self.gather.take(shot, index) {
+        match self.gather.take(*shot, index) {
             Gathered::Waits(left) if left.is_empty() => Ok(None),
             Gathered::Waits(left) => {
                 left.iter().for_each(|_| stream.fate(Fate::Spare));
@@ -127,7 +127,7 @@ impl Run<'_> {
     }
 
     /// Records a complete pose.
-    fn pose(&mut self, stream: &Stream, pictures: &[Box<Paired>]) -> Result<Option<String>> {
+    fn pose(&mut self, stream: &Stream, pictures: &[Paired]) -> Result<Option<String>> {
         let images: Vec<Image> = pictures.iter().map(|p| p.picture.image.clone()).collect();
         if let Err(fault) = self.bracket.merge(&images) {
             pictures.iter().for_each(|_| stream.fate(Fate::Spare));
@@ -149,10 +149,10 @@ impl Run<'_> {
 
     /// Pictures of a pose whose light is not in the ratio of their exposures: a camera may need more pictures until a
     /// new exposure is in effect. The pose is taken again.
-    fn disagree(&mut self, pictures: &[Box<Paired>], fault: Fault) -> Result<Option<String>> {
+    fn disagree(&mut self, pictures: &[Paired], fault: Fault) -> Result<Option<String>> {
         self.disagree += 1;
         let why = format!("its exposures disagree: {}", fault.what);
-        let left = |p: &Box<Paired>| LeftOut { id: p.picture.id, host_ns: p.picture.host_ns, why: why.clone() };
+        let left = |p: &Paired| LeftOut { id: p.picture.id, host_ns: p.picture.host_ns, why: why.clone() };
         self.list(pictures.iter().map(left).collect());
         let _ = self.gather.leave("its exposures disagree");
         if self.disagree >= DISAGREE {

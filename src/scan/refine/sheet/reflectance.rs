@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 const APART: f64 = 0.5;
 /// Such places lie up to this far beyond the outermost sheet, and nowhere farther away than `FARTHEST`.
 const BEYOND: f64 = 1.0;
-const FARTHEST: f64 = 8.0;
+pub(super) const FARTHEST: f64 = 8.0;
 /// Sum of the variances of all changes before any light is seen, and variance of the level beside them.
 const CHANGES: f64 = 1.0;
 const LEVEL: f64 = 100.0;

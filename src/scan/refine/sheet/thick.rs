@@ -4,7 +4,7 @@
 
 use super::super::slope::slope;
 use super::lines::{Beside, FARTHEST, Pull, Pulled, lines};
-use super::reflectance::{Light, Shift, shift};
+use super::reflectance::{FARTHEST as TOLD, Light, Shift, shift};
 use crate::fault::Result;
 use crate::scan::{CloudPoint, PointSource, Shots};
 use crate::solve::robust_scale;
@@ -115,7 +115,8 @@ impl Bell {
     fn shift(self, pull: &Pull) -> Shift {
         let light =
             |&Beside { at, light }: &Beside| Light { at: at / self.mm, light, sigma: self.speckle * light + FLOOR };
-        let lights: Vec<Light> = pull.lights.iter().map(light).collect();
+        // Farther away nothing is told of the reflectance here: between the two it may change anywhere.
+        let lights: Vec<Light> = pull.lights.iter().map(light).filter(|l| l.at.abs() <= TOLD).collect();
         let apart = |l: &Light| (l.light - 1.0).abs() / (self.speckle * l.light.max(1.0) * 2f64.sqrt() + FLOOR);
         let changed = (lights.iter().map(apart).fold(0.0, f64::max) - UNCHANGED).clamp(0.0, 1.0);
         if changed <= 0.0 {
