@@ -1,41 +1,30 @@
-//! In: a cloud, shot by shot. Out: each shot's line with two quantities for each of its points: the light that the
-//! shots before and after show at the same place along the stripe, and how far the point moves along its ray when the
-//! sheet moves.
-//! Frame and unit: the cloud's frame, mm; docs/math.md, Sheets that are thick (1) to (3).
+//! In: a cloud, shot by shot. Out: each shot's line with two quantities for each of its points: how fast the light
+//! grows there from shot to shot, and how far the point moves along its ray when the sheet moves.
+//! Frame and unit: the cloud's frame, mm; docs/math.md, Sheets that are thick (2) and (3).
 
 use crate::fault::Result;
 use crate::geometry::{Base, Plane, Vec3};
 use crate::scan::{Along, CloudPoint, PointSource, Shots};
 use rayon::prelude::*;
-use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Points of another line count as neighbours up to this many pixels along the stripe, closer ones with more weight.
-const BESIDE_PX: f64 = 1.5;
+const BESIDE_PX: f32 = 1.5;
 /// Least stripe width, px, for narrower or unmeasured stripes: centres on one surface differ by less than a pixel.
 const LEAST_PX: f32 = 1.0;
-/// Shots on either side whose light counts: as many as lie within twice the stripe's width, within these limits. A
-/// second shot on either side tells a bar of print from an edge.
-const FEWEST: usize = 2;
-const MOST: usize = 12;
-/// Points of a line that lie this far apart along the image axis, px, are next to each other.
-const NEXT_PX: std::ops::Range<f32> = 0.5..1.5;
+/// Largest change of the light from one shot to the next, as a logarithm; larger ones are clamped to it. There the
+/// light ends, and where between the two shots is unknown.
+const MOST: f64 = 1.5;
 
-/// Light of one shot at a point's place along the stripe.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Beside {
-    /// Distance of the shot's sheet from the point along the sheet's normal, mm.
-    pub at: f64,
-    /// Light relative to the point's own; 0 where the shot has no point near.
-    pub light: f64,
-}
-
-/// What the shots around it show about a point.
-#[derive(Clone, Debug, Default)]
+/// What a point's neighbours in the shots before and after show about it.
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pull {
-    /// The light of these shots and of the point's own, in their order; empty if none is known.
-    pub lights: Vec<Beside>,
-    /// Displacement of the point if the middle of its light lies 1 mm off the sheet's.
+    /// Change of the light's logarithm from shot to shot.
+    pub change: f64,
+    /// Difference between the mean of the neighbours' logarithms and the point's own. It marks light that falls on
+    /// an edge, or on a line thinner than the shots resolve.
+    pub dip: f64,
+    /// Displacement of the point for a change of 1 and a sheet of variance 1 mm².
     pub per: Vec3,
 }
 
@@ -45,10 +34,10 @@ pub(super) struct Line {
     pub points: Vec<CloudPoint>,
     /// Logarithms of the points' intensity.
     lights: Vec<f64>,
-    /// Pinhole, sheet and scale at the shot, if its pose is known.
+    /// Pinhole and sheet at the shot, if its pose is known.
     place: Option<Place>,
     /// Indices of the points in their order along the stripe, with their positions there, px.
-    order: Vec<(f64, u32)>,
+    order: Vec<(f32, u32)>,
     along: Along,
     /// Distance across the stripe at which a neighbour's weight is halved, px.
     width_px: f32,
@@ -58,22 +47,14 @@ pub(super) struct Line {
 struct Place {
     eye: Vec3,
     sheet: Plane<Base>,
-    /// Direction along the stripe.
-    along: Vec3,
-    /// Distance between neighbouring points along it, mm.
-    pixel_mm: f64,
 }
 
 /// A line, and what its neighbours show about its points, one entry a point.
+#[derive(Clone)]
 pub(super) struct Pulled {
     pub line: Arc<Line>,
     pub pulls: Vec<Pull>,
-    /// Shots to those with which this one is compared: about half a stripe's width. Closer ones are shifted alike.
-    pub stride: u32,
 }
-
-/// The largest such stride.
-pub(super) const FARTHEST: usize = MOST / 4;
 
 /// Position of a point along its stripe and across it, px.
 fn in_picture(along: Along, p: &CloudPoint) -> (f32, f32) {
@@ -84,60 +65,36 @@ fn light(p: &CloudPoint) -> f64 {
     f64::from(p.intensity.max(f32::MIN_POSITIVE)).ln()
 }
 
-impl Place {
-    /// `None` if the shot's pose or the sheet is not known, or if no two points lie beside each other.
-    fn of(shot: u32, points: &[CloudPoint], shots: &Shots) -> Option<Place> {
-        let (place, sheet) = shots.place(shot).zip(shots.sheet)?;
-        let normal = place.direction(&sheet.normal);
-        let on = place.point(&(sheet.normal * sheet.offset));
-        let along = normal.cross(&place.direction(&Vec3::z())).try_normalize(1e-9)?;
-        let mut order: Vec<(f32, f64)> =
-            points.iter().map(|p| (in_picture(shots.along, p).0, p.at().dot(&along))).collect();
-        order.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let next = order.windows(2).filter(|w| NEXT_PX.contains(&(w[1].0 - w[0].0)));
-        let mut apart: Vec<f64> = next.map(|w| ((w[1].1 - w[0].1) / f64::from(w[1].0 - w[0].0)).abs()).collect();
-        apart.sort_by(f64::total_cmp);
-        let pixel_mm = *apart.get(apart.len() / 2)?;
-        let sheet = Plane::new(normal, normal.dot(&on))?;
-        (pixel_mm > 0.0).then(|| Place { eye: place.point(&Vec3::zeros()), sheet, along, pixel_mm })
-    }
-}
-
 impl Line {
     fn new(shot: u32, points: Vec<CloudPoint>, shots: &Shots) -> Line {
-        let place = Place::of(shot, &points, shots);
-        let mut order: Vec<(f64, u32)> = match &place {
-            Some(place) => points.iter().zip(0..).map(|(p, i)| (place.position(p), i)).collect(),
-            None => Vec::new(),
-        };
+        let place = shots.place(shot).zip(shots.sheet).and_then(|(place, sheet)| {
+            let normal = place.direction(&sheet.normal);
+            let on = place.point(&(sheet.normal * sheet.offset));
+            Some(Place { eye: place.point(&Vec3::zeros()), sheet: Plane::new(normal, normal.dot(&on))? })
+        });
+        let mut order: Vec<(f32, u32)> =
+            points.iter().zip(0..).map(|(p, i)| (in_picture(shots.along, p).0, i)).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let lights = points.iter().map(light).collect();
         let width_px = shots.stripe_px.unwrap_or(0.0).max(LEAST_PX);
         Line { shot, points, lights, place, order, along: shots.along, width_px }
     }
 
-    /// Width of the stripe on the surface, mm (1 sigma): the sheet is no thicker.
-    pub fn width_mm(&self) -> Option<f64> {
-        self.place.as_ref().map(|place| f64::from(self.width_px) * place.pixel_mm)
-    }
-
     /// This line's points that are neighbours of a point of another line: index, distances along and across the
-    /// stripe, px. Along the stripe the places on the surface count: under a slanted stripe the next shot shows the
-    /// same place some columns beside.
-    fn beside(&self, p: &CloudPoint) -> impl Iterator<Item = (usize, f64, f64)> + '_ {
-        let along = self.place.as_ref().map_or(0.0, |place| place.position(p));
-        let across = in_picture(self.along, p).1;
+    /// stripe, px.
+    fn beside(&self, p: &CloudPoint) -> impl Iterator<Item = (usize, f32, f32)> + '_ {
+        let (along, across) = in_picture(self.along, p);
         let first = self.order.partition_point(|(a, _)| *a <= along - BESIDE_PX);
         let near = self.order[first..].iter().take_while(move |(a, _)| *a < along + BESIDE_PX);
         near.map(move |(a, i)| {
             let i = *i as usize;
-            (i, (a - along).abs(), f64::from((in_picture(self.along, &self.points[i]).1 - across).abs()))
+            (i, (a - along).abs(), (in_picture(self.along, &self.points[i]).1 - across).abs())
         })
     }
 
     /// This line's point that is nearest to a point of another line.
     pub fn nearest(&self, p: &CloudPoint) -> Option<usize> {
-        let square = |(_, along, across): &(usize, f64, f64)| along * along + across * across;
+        let square = |(_, along, across): &(usize, f32, f32)| along * along + across * across;
         self.beside(p).min_by(|a, b| square(a).total_cmp(&square(b))).map(|(i, _, _)| i)
     }
 
@@ -147,7 +104,7 @@ impl Line {
     fn light(&self, p: &CloudPoint) -> (f64, f64) {
         let (mut sum, mut sure, mut all) = (0.0, 0.0, 0.0);
         for (i, along, across) in self.beside(p) {
-            let weight = (1.0 - along / BESIDE_PX) / (1.0 + (across / f64::from(self.width_px)).powi(2));
+            let weight = f64::from((1.0 - along / BESIDE_PX) / (1.0 + (across / self.width_px).powi(2)));
             // A fit that determines its position poorly determines its intensity poorly too.
             let known = weight / f64::from(self.points[i].sigma_mm.max(1e-6)).powi(2);
             sum += known * self.lights[i];
@@ -157,89 +114,63 @@ impl Line {
         if sure > 0.0 { (sum / sure, all.min(1.0)) } else { (0.0, 0.0) }
     }
 
-    /// What the lines around it, itself among them, show about a point of this one. Where a shot has no point near, the
-    /// surface ends, or is dark or hidden: its light is 0.
-    fn pull(&self, i: usize, around: &[Arc<Line>]) -> Pull {
-        let Some(Place { eye, sheet, .. }) = &self.place else { return Pull::default() };
+    /// What two neighbouring lines show about a point of this one.
+    fn pull(&self, i: usize, before: Option<&Line>, after: Option<&Line>) -> Pull {
         let p = &self.points[i];
         let (at, here) = (p.at(), self.light(p).0);
-        let beside = |line: &Arc<Line>| {
-            let place = line.place.as_ref()?;
-            let (light, weight) = line.light(p);
-            Some(Beside { at: -place.sheet.distance(&at), light: weight * (light - here).exp() })
-        };
-        let mut lights: Vec<Beside> = around.iter().filter_map(beside).collect();
-        lights.sort_by(|a, b| a.at.total_cmp(&b.at));
+        let Some(Place { eye, sheet }) = &self.place else { return Pull::default() };
         let ray = at - eye;
-        let per = ray / ray.dot(&sheet.normal);
-        let known = per.iter().all(|x| x.is_finite()) && lights.iter().all(|l| l.at.is_finite() && l.light.is_finite());
-        if known { Pull { lights, per } } else { Pull::default() }
+        // Of a neighbouring line: how much brighter it is next to the point, the distance of its sheet from the
+        // point along the normal, and its weight.
+        let beside = |line: Option<&Line>| {
+            let line = line?;
+            let way = -line.place.as_ref()?.sheet.distance(&at);
+            let (light, weight) = line.light(p);
+            Some([(light - here).clamp(-MOST, MOST), way, weight])
+        };
+        let [a, from, before] = beside(before).unwrap_or_default();
+        let [b, to, after] = beside(after).unwrap_or_default();
+        // If both sheets lie on the same side of the point, the point is not between them.
+        if before + after <= 0.0 || before * after > 0.0 && from * to > 0.0 {
+            return Pull::default();
+        }
+        let change = (after * b - before * a) / (before + after).max(1.0);
+        let way = (after * to - before * from) / (before + after);
+        let dip = 0.5 * (a + b) * before.min(after);
+        let per = ray / (ray.dot(&sheet.normal) * way);
+        if per.iter().all(|x| x.is_finite()) { Pull { change, dip, per } } else { Pull::default() }
     }
 
-    /// Shots on either side that show the reflectance within twice the stripe's width.
-    fn reach(&self, around: &[Arc<Line>]) -> u32 {
-        let on_sheet = |line: &Line| line.place.as_ref().map(|p| (line.shot, p.sheet.distance(&self.points[0].at())));
-        let apart = around.windows(2).filter_map(|w| Some((on_sheet(&w[0])?, on_sheet(&w[1])?)));
-        let mut steps: Vec<f64> = apart.map(|(a, b)| (b.1 - a.1).abs() / f64::from(b.0.abs_diff(a.0))).collect();
-        steps.sort_by(f64::total_cmp);
-        let step = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
-        // Not a number without a step: then the limit.
-        let count = (2.0 * self.width_mm().unwrap_or(0.0) / step).ceil();
-        (count.min(MOST as f64) as usize).max(FEWEST) as u32
-    }
-
-    fn pulled(self: &Arc<Line>, around: &[Arc<Line>]) -> Pulled {
-        let reach = self.reach(around);
-        let first = around.partition_point(|line| line.shot + reach < self.shot);
-        let last = around.partition_point(|line| line.shot <= self.shot + reach);
-        let near = &around[first..last];
-        let pulls = (0..self.points.len()).into_par_iter().with_min_len(64).map(|i| self.pull(i, near)).collect();
-        Pulled { line: self.clone(), pulls, stride: (reach / 4).max(1) }
-    }
-}
-
-impl Place {
-    /// Position of a point along the stripe, px.
-    fn position(&self, p: &CloudPoint) -> f64 {
-        p.at().dot(&self.along) / self.pixel_mm
+    fn pulled(self: Arc<Line>, before: Option<&Line>, after: Option<&Line>) -> Pulled {
+        // Only adjacent shots are neighbours. Across dark and missing shots it is unknown what happened between.
+        let next = |line: &&Line| line.shot.abs_diff(self.shot) == 1;
+        let (before, after) = (before.filter(next), after.filter(next));
+        let pulls =
+            (0..self.points.len()).into_par_iter().with_min_len(64).map(|i| self.pull(i, before, after)).collect();
+        Pulled { line: self, pulls }
     }
 }
 
 /// Passes the lines of a cloud, whose points come in the order of their shots, to `take` in that order.
 pub(super) fn lines(cloud: &dyn PointSource, shots: &Shots, take: &mut dyn FnMut(Pulled) -> Result<()>) -> Result<()> {
-    // The lines before and after the next one that is passed on, which is the one of this index.
-    let (mut around, mut next) = (VecDeque::<Arc<Line>>::new(), 0);
-    let mut points: Vec<CloudPoint> = Vec::new();
-    let mut pass = |around: &mut VecDeque<Arc<Line>>, next: &mut usize| -> Result<()> {
-        let all = around.make_contiguous();
-        let line = all[*next].clone();
-        take(line.pulled(all))?;
-        *next += 1;
-        if *next > MOST {
-            around.pop_front();
-            *next -= 1;
-        }
-        Ok(())
+    let (mut before, mut last): (Option<Arc<Line>>, Option<Arc<Line>>) = (None, None);
+    let mut next: Vec<CloudPoint> = Vec::new();
+    let mut close = |points: Vec<CloudPoint>| -> Result<()> {
+        let line = points.first().map(|p| p.shot).map(|shot| Arc::new(Line::new(shot, points, shots)));
+        let done = last.clone().map_or(Ok(()), |last| take(last.pulled(before.as_deref(), line.as_deref())));
+        before = std::mem::replace(&mut last, line);
+        done
     };
     let mut closed = Ok(());
-    cloud.for_each_chunk(&mut |chunk| {
-        for line in chunk.chunk_by(|a, b| a.shot == b.shot) {
-            if points.first().is_some_and(|p| p.shot != line[0].shot) {
-                let done = std::mem::take(&mut points);
-                around.push_back(Arc::new(Line::new(done[0].shot, done, shots)));
-                if closed.is_ok() && around.len() > next + MOST {
-                    closed = pass(&mut around, &mut next);
-                }
+    cloud.for_each_chunk(&mut |points| {
+        for line in points.chunk_by(|a, b| a.shot == b.shot) {
+            if next.first().is_some_and(|p| p.shot != line[0].shot) && closed.is_ok() {
+                closed = close(std::mem::take(&mut next));
             }
-            points.extend_from_slice(line);
+            next.extend_from_slice(line);
         }
     })?;
     closed?;
-    if let Some(shot) = points.first().map(|p| p.shot) {
-        around.push_back(Arc::new(Line::new(shot, points, shots)));
-    }
-    while next < around.len() {
-        pass(&mut around, &mut next)?;
-    }
-    Ok(())
+    close(next)?;
+    close(Vec::new())
 }

@@ -3,7 +3,6 @@
 //! Frame and unit: the cloud's frame, mm (docs/math.md, Sheets that are thick).
 
 mod lines;
-mod reflectance;
 mod thick;
 
 pub use thick::{SheetFound, Thick};

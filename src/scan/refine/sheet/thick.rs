@@ -2,13 +2,11 @@
 //! points without its effect where brightness changes.
 //! Frame and unit: the cloud's frame, mm; docs/math.md, Sheets that are thick.
 
-use super::super::slope::slope;
-use super::lines::{Beside, FARTHEST, Pull, Pulled, lines};
-use super::reflectance::{FARTHEST as TOLD, Light, Shift, shift};
+use super::super::slope::{Slope, slope};
+use super::lines::{Pull, Pulled, lines};
 use crate::fault::Result;
 use crate::scan::{CloudPoint, PointSource, Shots};
 use crate::solve::robust_scale;
-use rayon::prelude::*;
 use std::collections::VecDeque;
 
 /// A point is compared with its neighbours if it lies between them, at least this share of their distance from each.
@@ -18,28 +16,15 @@ const BETWEEN: f64 = 0.2;
 const LEVEL: f64 = 0.6;
 /// Residuals beyond this many robust deviations are edges.
 const EDGE: f64 = 10.0;
-/// Least and largest relative standard deviation of a light by speckle and noise. On a mostly printed surface the
-/// lights' usual scatter is the print itself.
-const SPECKLE: [f64; 2] = [0.03, 0.12];
-/// Part of that deviation that does not depend on the light, relative to the point's own light.
-const FLOOR: f64 = 0.04;
-/// Lights that differ from the point's own by less than this many deviations of the difference show no change.
-const UNCHANGED: f64 = 1.5;
-/// A light of less than this, relative to the point's own, shows nothing.
-const DARK: f64 = 0.2;
-/// Thicknesses among which the most likely one is searched, in widths of the stripe on the surface: the first, the
-/// ratio from one to the next, their number.
-const THINNEST: f64 = 0.15;
-const RATIO: f64 = 1.25;
-const TRIED: i32 = 11;
-/// Comparisons that the search uses.
-const SAMPLE: usize = 1 << 11;
-/// An expected distance counts as one from this many of its stated standard deviations on.
-const EXPECTED: f64 = 0.5;
+/// Changes of light from shot to shot within this many of their robust deviations count as speckle and noise. A
+/// point in 80 of pure noise is moved.
+const SPECKLE: f64 = 2.5;
+/// Upper bound of that limit: on a mostly printed surface the usual changes are the print itself.
+const UNCHANGED: f64 = 0.25;
 /// With fewer comparisons nothing is concluded.
 const FEWEST: usize = 256;
 /// Above this number comparisons are thinned out.
-const MOST: usize = 1 << 14;
+const MOST: usize = 1 << 16;
 const ROUNDS: usize = 5;
 
 /// Effect of the sheet's thickness where brightness changes; in scan.json.
@@ -51,7 +36,7 @@ pub struct SheetFound {
     pub thickness_mm: f64,
     /// Standard deviation of that.
     pub thickness_sigma_mm: f64,
-    /// Standard deviation that the points keep where brightness changes, mm: root mean square over the moved points.
+    /// The remaining scatter where brightness changes equals the shifts by a sheet of this standard deviation, mm.
     /// It is included in the points' sigma.
     pub scatter_mm: f64,
     /// Share of the points that were moved by more than their standard deviation.
@@ -67,100 +52,44 @@ impl std::fmt::Display for SheetFound {
              (1 sigma). "
         )?;
         write!(f, "This shift was removed; for {:.1} % of the points it exceeded their sigma. ", 100.0 * moved)?;
-        write!(f, "These points keep a standard deviation of {scatter_mm:.3} mm, which their sigma contains.")
+        write!(f, "The remaining scatter equals that of a {scatter_mm:.3} mm sheet; the points' sigma contains it.")
     }
 }
 
 /// What a cloud shows about its sheet.
 #[derive(Clone, Copy, Debug)]
 pub struct Thick {
-    bell: Bell,
-    /// Standard deviation of the sheet's thickness, mm.
-    sigma_mm: f64,
-    /// Factor of the shifts' stated standard deviations that the points' scatter shows; at least 1.
+    /// Variance of the sheet, mm².
+    square: Slope,
+    /// Remaining scatter of the points about that effect, as a variance of the sheet, mm².
     left: f64,
+    quiet: Quiet,
 }
 
-/// What the shifts are computed with.
+/// Limits of changes and dips that are speckle and noise.
 #[derive(Clone, Copy, Debug)]
-struct Bell {
-    /// Standard deviation of the sheet, mm.
-    mm: f64,
-    /// Relative standard deviation of a light.
-    speckle: f64,
+struct Quiet {
+    change: f64,
+    dip: f64,
 }
 
 /// One of three points that are compared.
-#[derive(Clone)]
+#[derive(Clone, Copy)]
 struct Part {
-    pull: Pull,
-    /// Shift of the comparison along the ray for a shift of the point's light by 1 mm.
+    change: f64,
+    dip: f64,
+    /// Shift of the comparison along the ray for a change of 1 and a sheet of 1 mm², mm.
     by: f64,
 }
 
 /// A point between its two neighbours.
-#[derive(Clone)]
+#[derive(Clone, Copy)]
 struct Between {
     /// Its distance beyond them along its ray, mm, and the stated variance of that distance from all three.
     beyond: f64,
     stated: f64,
     /// The point itself and the two neighbours.
     parts: [Part; 3],
-    /// Width of the stripe, mm.
-    width_mm: f64,
-}
-
-impl Bell {
-    /// Shift of the middle of a point's light, mm.
-    fn shift(self, pull: &Pull) -> Shift {
-        let light =
-            |&Beside { at, light }: &Beside| Light { at: at / self.mm, light, sigma: self.speckle * light + FLOOR };
-        // Farther away nothing is told of the reflectance here: between the two it may change anywhere.
-        let lights: Vec<Light> = pull.lights.iter().map(light).filter(|l| l.at.abs() <= TOLD).collect();
-        let apart = |l: &Light| (l.light - 1.0).abs() / (self.speckle * l.light.max(1.0) * 2f64.sqrt() + FLOOR);
-        let changed = (lights.iter().map(apart).fold(0.0, f64::max) - UNCHANGED).clamp(0.0, 1.0);
-        if changed <= 0.0 {
-            return Shift::default();
-        }
-        let Shift { by, sigma } = shift(&lights);
-        let size = changed * self.mm;
-        Shift { by: by * size, sigma: sigma * size }
-    }
-
-    /// Shift of a comparison, mm, and the variance of that.
-    fn shifts(self, between: &Between) -> (f64, f64) {
-        let each = between.parts.iter().map(|part| {
-            let Shift { by, sigma } = self.shift(&part.pull);
-            (by * part.by, (sigma * part.by).powi(2))
-        });
-        each.fold((0.0, 0.0), |(by, variance), one| (by + one.0, variance + one.1))
-    }
-
-    /// Expected and observed distances of the comparisons, and the variances of the expected ones.
-    fn pairs(self, all: &[Between]) -> (Vec<[f64; 2]>, Vec<f64>) {
-        let shifts: Vec<(f64, f64)> = all.par_iter().with_min_len(64).map(|b| self.shifts(b)).collect();
-        (shifts.iter().zip(all).map(|(s, b)| [-s.0, b.beyond]).collect(), shifts.iter().map(|s| s.1).collect())
-    }
-
-    /// Negative logarithm of the comparisons' likelihood, but for a constant. Residuals have Cauchy's distribution,
-    /// whose wings bear those of edges.
-    fn unlikely(self, all: &[Between]) -> f64 {
-        let pairs = self.pairs(all).0;
-        all.iter().zip(&pairs).map(|(b, [expected, seen])| ((seen - expected).powi(2) / b.stated).ln_1p()).sum()
-    }
-
-    /// The most likely thickness, for stripes of this width on the surface, mm.
-    fn searched(self, all: &[Between], width_mm: f64) -> Bell {
-        let bell = |k: f64| Bell { mm: THINNEST * width_mm * RATIO.powf(k), ..self };
-        let unlikely: Vec<f64> = (0..TRIED).map(|k| bell(f64::from(k)).unlikely(all)).collect();
-        let best = (0..unlikely.len()).min_by(|a, b| unlikely[*a].total_cmp(&unlikely[*b])).unwrap_or(0);
-        // The vertex of the parabola through the best and the two beside it.
-        let vertex = match unlikely.get(best.wrapping_sub(1)..best.saturating_add(2)) {
-            Some([a, b, c]) if a + c > 2.0 * b => 0.5 * (a - c) / (a + c - 2.0 * b),
-            _ => 0.0,
-        };
-        bell(best as f64 + vertex)
-    }
 }
 
 impl Thick {
@@ -168,51 +97,42 @@ impl Thick {
     /// show that brightness shifts its points.
     pub fn of(cloud: &dyn PointSource, shots: &Shots) -> Result<Option<Thick>> {
         let (mut all, mut every, mut seen) = (Vec::new(), 1, 0_usize);
-        let mut near: VecDeque<Pulled> = VecDeque::new();
+        let mut three: VecDeque<Pulled> = VecDeque::new();
         lines(cloud, shots, &mut |line| {
-            near.push_back(line);
-            let known = near.make_contiguous();
-            let Some(after) = known.last() else { return Ok(()) };
-            for line in known.iter().filter(|line| line.line.shot + line.stride == after.line.shot) {
-                let Some(before) = known.iter().find(|b| b.line.shot + line.stride == line.line.shot) else {
-                    continue;
-                };
+            three.push_back(line);
+            if let [before, line, after] = three.make_contiguous() {
                 for i in 0..line.pulls.len() {
-                    seen += 1;
+                    let Some(between) = between(before, line, i, after) else { continue };
                     if seen.is_multiple_of(every) {
-                        all.extend(between(before, line, i, after));
+                        all.push(between);
                     }
-                    if all.len() >= MOST {
+                    seen += 1;
+                    if all.len() == MOST {
                         let mut k = 0;
                         all.retain(|_| (k += 1, k % 2 == 1).1);
                         every *= 2;
                     }
                 }
-            }
-            if near.len() > 2 * FARTHEST {
-                near.pop_front();
+                three.pop_front();
             }
             Ok(())
         })?;
         if all.len() < FEWEST {
             return Ok(None);
         }
-        // The mean of two lights differs from the one between them by the root of 1.5 deviations.
-        let mut dips: Vec<f64> = all.iter().filter_map(|b| dip(&b.parts[0].pull)).map(f64::abs).collect();
-        let speckle = (robust_scale(&mut dips, 1) / 1.5f64.sqrt()).clamp(SPECKLE[0], SPECKLE[1]);
-        let sample: Vec<Between> = all.iter().step_by(all.len().div_ceil(SAMPLE)).cloned().collect();
-        let mut widths: Vec<f64> = sample.iter().map(|b| b.width_mm).collect();
-        widths.sort_by(f64::total_cmp);
-        let width = widths[widths.len() / 2];
-        let bell = Bell { mm: 0.0, speckle }.searched(&sample, width);
-        let (pairs, unsure) = bell.pairs(&all);
-        let expected = pairs.iter().zip(&all).filter(|(p, b)| p[0].abs() > EXPECTED * b.stated.sqrt()).count();
-        let Some(size) = slope(&pairs).filter(|size| size.sure() && expected >= FEWEST) else { return Ok(None) };
-        let rest = |((b, [expected, seen]), unsure): ((&Between, &[f64; 2]), &f64)| {
-            [*unsure, seen - size.is * expected, b.stated]
+        let scale = |of: fn(&Part) -> f64| {
+            let mut sizes: Vec<f64> = all.iter().map(|b: &Between| of(&b.parts[0]).abs()).collect();
+            (SPECKLE * robust_scale(&mut sizes, 1)).min(UNCHANGED)
         };
-        let rests: Vec<[f64; 3]> = all.iter().zip(&pairs).zip(&unsure).map(rest).collect();
-        Ok(Some(Thick { bell, sigma_mm: 0.5 * bell.mm * size.sigma / size.is, left: left(&rests) }))
+        let quiet = Quiet { change: scale(|p| p.change), dip: scale(|p| p.dip) };
+        let pulls = |b: &Between| b.parts.iter().map(|p| quiet.change_of(p.change) * p.by).sum::<f64>();
+        let pairs: Vec<[f64; 2]> = all.iter().map(|b| [-pulls(b), b.beyond]).collect();
+        let Some(square) = slope(&pairs).filter(Slope::sure) else { return Ok(None) };
+        let unsure = |b: &Between| b.parts.iter().map(|p| (quiet.unsure(p.change, p.dip) * p.by).powi(2)).sum::<f64>();
+        let rest = |(b, [expected, seen]): (&Between, &[f64; 2])| [unsure(b), seen - square.is * expected, b.stated];
+        let rests: Vec<[f64; 3]> = all.iter().zip(&pairs).map(rest).collect();
+        let left = left(&rests, square.is);
+        Ok(Some(Thick { square, left, quiet }))
     }
 
     /// Passes the corrected points to `take`, line by line in their order.
@@ -222,51 +142,58 @@ impl Thick {
         shots: &Shots,
         take: &mut dyn FnMut(&[CloudPoint]) -> Result<()>,
     ) -> Result<SheetFound> {
-        let (mut moved, mut all, mut scattered) = (0_u64, 0_u64, 0.0);
-        let mut points: Vec<CloudPoint> = Vec::new();
-        lines(cloud, shots, &mut |Pulled { line, pulls, .. }| {
-            let shifts: Vec<Shift> = pulls.par_iter().with_min_len(64).map(|pull| self.bell.shift(pull)).collect();
+        let (mut moved, mut points, mut all) = (0_u64, Vec::new(), 0_u64);
+        lines(cloud, shots, &mut |Pulled { line, pulls }| {
             points.clear();
-            for ((p, Pull { per, .. }), Shift { by, sigma }) in line.points.iter().zip(&pulls).zip(shifts) {
-                let by = per * by;
-                let scatter = per.norm() * sigma * self.left;
-                if by.norm() as f32 > p.sigma_mm {
-                    moved += 1;
-                    scattered += scatter * scatter;
-                }
+            for (p, Pull { change, dip, per }) in line.points.iter().zip(&pulls) {
+                let by = per * (self.quiet.change_of(*change) * self.square.is);
+                moved += u64::from(by.norm() as f32 > p.sigma_mm);
                 let moved_to = p.moved_to(p.at() + by);
+                let scatter = per.norm() * self.quiet.unsure(*change, *dip) * self.left;
                 points.push(CloudPoint { sigma_mm: p.sigma_mm.hypot(scatter as f32), ..moved_to });
             }
             all += points.len() as u64;
             take(&points)
         })?;
+        let thickness_mm = self.square.is.sqrt();
         Ok(SheetFound {
-            thickness_mm: self.bell.mm,
-            thickness_sigma_mm: self.sigma_mm,
-            scatter_mm: (scattered / moved.max(1) as f64).sqrt(),
+            thickness_mm,
+            thickness_sigma_mm: 0.5 * self.square.sigma / thickness_mm,
+            scatter_mm: self.left.sqrt(),
             moved: moved as f64 / all.max(1) as f64,
         })
     }
 }
 
-/// How much brighter the two sheets beside a point are than its own, as a logarithm; `None` where one of them shows
-/// nothing. The point's own sheet is the one nearest to it.
-fn dip(pull: &Pull) -> Option<f64> {
-    let lights = &pull.lights;
-    let own = (0..lights.len()).min_by(|a, b| lights[*a].at.abs().total_cmp(&lights[*b].at.abs()))?;
-    let (before, after) = (lights.get(own.checked_sub(1)?)?, lights.get(own + 1)?);
-    (before.light.min(after.light) > DARK).then(|| 0.5 * (before.light.ln() + after.light.ln()))
+impl Quiet {
+    /// The part of a change that exceeds speckle and noise.
+    fn change_of(&self, change: f64) -> f64 {
+        beyond(change, self.change)
+    }
+
+    /// Uncertainty that change and dip leave about the light's middle, expressed as the size of a change.
+    fn unsure(&self, change: f64, dip: f64) -> f64 {
+        self.change_of(change).hypot(beyond(dip, self.dip))
+    }
 }
 
-/// Factor of the shifts' standard deviations that the points' scatter shows. Each entry is (variance of the shifts,
-/// residual, its stated variance). The stated variance is scaled to the residuals' usual size; the slope of the
-/// squared residuals beyond it is fitted by weighted least squares. The result is at least 1.
-fn left(rests: &[[f64; 3]]) -> f64 {
+/// Soft threshold: 0 within `size`, the number itself beyond twice `size`, and linear between the two. It has no
+/// step, so that a result never depends on which side of a limit a number lies.
+fn beyond(number: f64, size: f64) -> f64 {
+    let over = number.abs() - size;
+    number.signum() * (2.0 * over).clamp(0.0, number.abs())
+}
+
+/// Scatter of the points where brightness changes, as a variance of the sheet. Each entry is (sum of squares of what
+/// is unsure, residual, its stated variance). The stated variance is scaled to the residuals' usual size; the slope
+/// of the squared residuals beyond it is fitted by weighted least squares. The result is at least `square`, because
+/// on a surface that is printed all over most residuals contain shifts already.
+fn left(rests: &[[f64; 3]], square: f64) -> f64 {
     let mut over: Vec<f64> = rests.iter().map(|[_, rest, stated]| rest.abs() / stated.sqrt()).collect();
     let usual = robust_scale(&mut over, 1).powi(2);
     let noisy = rests.iter().map(|[unsure, rest, stated]| (*unsure, rest * rest, usual * stated));
     let near: Vec<(f64, f64, f64)> = noisy.filter(|(_, rest, noise)| *rest < EDGE * EDGE * noise).collect();
-    let mut grows = 1.0_f64;
+    let mut grows = square * square;
     for _ in 0..ROUNDS {
         let (mut all, mut across) = (0.0, 0.0);
         for &(unsure, rest, noise) in &near {
@@ -275,9 +202,9 @@ fn left(rests: &[[f64; 3]]) -> f64 {
             across += weight * (rest - noise);
         }
         if all <= 0.0 {
-            return 1.0;
+            return square;
         }
-        grows = (across / all).max(1.0);
+        grows = (across / all).max(square * square);
     }
     grows.sqrt()
 }
@@ -299,19 +226,14 @@ fn between(before: &Pulled, line: &Pulled, i: usize, after: &Pulled) -> Option<B
     if !(BETWEEN..=1.0 - BETWEEN).contains(&share) {
         return None;
     }
-    let part = |line: &Pulled, i: usize, part: f64| {
-        let pull = line.pulls[i].clone();
-        Part { by: part * pull.per.dot(&ray), pull }
-    };
-    let width_mm = line.line.width_mm()?;
+    let part = |&Pull { change, dip, per }: &Pull, part: f64| Part { change, dip, by: part * per.dot(&ray) };
     let stated = |p: &CloudPoint, part: f64| (f64::from(p.sigma_mm) * part).powi(2);
     let stated = stated(p, 1.0) + stated(&before.line.points[j], 1.0 - share) + stated(&after.line.points[k], share);
     // A fit that its light does not determine states any size, even infinite or NaN.
     stated.is_normal().then_some(Between {
         beyond: to.dot(&ray) - share * deeper,
         stated,
-        parts: [part(line, i, 1.0), part(before, j, share - 1.0), part(after, k, -share)],
-        width_mm,
+        parts: [part(pull, 1.0), part(&before.pulls[j], share - 1.0), part(&after.pulls[k], -share)],
     })
 }
 
@@ -338,8 +260,6 @@ mod tests {
         speckle: f64,
         flicker: f64,
         focal_px: f64,
-        /// Scatter of the points along the vertical, mm.
-        noise_mm: f64,
     }
 
     /// Printed lines 1.6 mm wide with gaps as wide, edges 0.15 mm wide, four times as bright as the ground.
@@ -359,8 +279,8 @@ mod tests {
         speckle: 0.03,
         flicker: 0.0,
         focal_px: 600.0,
-        noise_mm: 0.01,
     };
+    const NOISE_MM: f64 = 0.01;
 
     fn sheet() -> Plane<Camera> {
         Plane::new(Vec3::new(0.0, 150.0, 60.0), 9000.0).unwrap()
@@ -378,7 +298,7 @@ mod tests {
                 let place: Rigid<Base, Camera> = Rigid::new(turned, Vec3::new(0.0, self.step * k, 150.0));
                 let laser = (self.flicker * noise.normal()).exp();
                 for column in 0..200 {
-                    let x = (f64::from(column) - 100.0) * 150.0 / self.focal_px;
+                    let x = 0.1 * f64::from(column) - 10.0;
                     let seen = |y: f64| {
                         let on = place.point(&Vec3::new(x, y, 150.0));
                         let on = Vec3::new(on.x, on.y, (self.height)(on.x, on.y));
@@ -395,7 +315,7 @@ mod tests {
                     }
                     let ray = ray / light;
                     let depth = sheet().offset / sheet().normal.dot(&ray);
-                    let at = place.point(&(ray * depth)) + Vec3::z() * (self.noise_mm * noise.normal());
+                    let at = place.point(&(ray * depth)) + Vec3::z() * (NOISE_MM * noise.normal());
                     let (u, v) = (column as f32, 200.0 + (self.focal_px * ray.y) as f32);
                     let (u, v) = if self.along == Along::U { (u, v) } else { (v, u) };
                     let intensity = (8.0 * laser * light * (self.speckle * noise.normal()).exp()) as f32;
@@ -403,7 +323,7 @@ mod tests {
                     cloud.push(CloudPoint {
                         position,
                         intensity,
-                        sigma_mm: self.noise_mm as f32,
+                        sigma_mm: NOISE_MM as f32,
                         shot,
                         u,
                         v,
@@ -519,7 +439,7 @@ mod tests {
         println!("beyond three standard deviations: {before:.4} -> {after:.4}");
         assert!(before > 0.2 && after < 0.02, "{before} -> {after}");
         let SheetFound { moved, scatter_mm, .. } = found.unwrap();
-        assert!((0.2..0.7).contains(&moved) && (0.005..0.03).contains(&scatter_mm), "{moved}, {scatter_mm}");
+        assert!((0.2..0.7).contains(&moved) && (0.1..0.2).contains(&scatter_mm), "{moved}, {scatter_mm}");
     }
 
     /// Without an effect nothing is moved: uniform brightness, speckle, a flickering laser, a thin sheet, bright
@@ -548,106 +468,5 @@ mod tests {
         let (cloud, shots) = PRINTED.scan(1);
         assert!(Thick::of(&cloud, &Shots::unplaced(shots.along)).unwrap().is_none());
         assert!(Thick::of(&Vec::new(), &shots).unwrap().is_none());
-    }
-
-    /// Widths of the chart's bars, mm, each in a field of 10 mm.
-    const BARS: [f64; 5] = [0.2, 0.5, 1.0, 2.0, 3.0];
-
-    fn field(x: f64) -> usize {
-        ((x + 25.0) / 10.0).clamp(0.0, 4.0) as usize
-    }
-
-    /// Bars turned by so many degrees, with gaps as wide and a quarter as bright.
-    fn chart<const DEGREES: i32>(x: f64, y: f64) -> f64 {
-        let (sin, cos) = f64::from(DEGREES).to_radians().sin_cos();
-        if (x * sin + y * cos).rem_euclid(2.0 * BARS[field(x)]) < BARS[field(x)] { 1.0 } else { 0.25 }
-    }
-
-    /// Shifts by the rule of this program's earlier versions: the slope of the logarithm of the light between the
-    /// shots before and after, for the true sheet.
-    fn by_slope(cloud: &[CloudPoint], shots: &Shots, thick: f64) -> Vec<CloudPoint> {
-        let mut out = Vec::new();
-        lines(&cloud.to_vec(), shots, &mut |Pulled { line, pulls, .. }| {
-            for (p, Pull { lights, per }) in line.points.iter().zip(&pulls) {
-                let own = lights.iter().position(|l| l.at.abs() < 1e-3).filter(|i| (1..lights.len() - 1).contains(i));
-                let by = own.map_or(0.0, |i| {
-                    let (a, b) = (lights[i - 1], lights[i + 1]);
-                    thick * thick * (b.light.max(1e-3) / a.light.max(1e-3)).ln() / (b.at - a.at)
-                });
-                out.push(p.moved_to(p.at() + per * by));
-            }
-            Ok(())
-        })
-        .unwrap();
-        out
-    }
-
-    /// What remains of the pull of print, at eleven angles and four steps. The points within 1 mm of a field's rim do
-    /// not count.
-    #[test]
-    fn a_chart_of_bars_pulls_less_than_before() {
-        let charts: [fn(f64, f64) -> f64; 11] = [
-            chart::<0>,
-            chart::<8>,
-            chart::<16>,
-            chart::<24>,
-            chart::<32>,
-            chart::<40>,
-            chart::<48>,
-            chart::<56>,
-            chart::<64>,
-            chart::<72>,
-            chart::<80>,
-        ];
-        let mut faults = Vec::new();
-        println!("root mean square of the points' distance from the plate, um: as measured, by the slope, now");
-        for (step, most) in [(0.25, 0.65), (1.0, 0.78), (2.6, 0.68), (5.0, 0.83)] {
-            let scans: Vec<[Vec<CloudPoint>; 3]> = charts
-                .par_iter()
-                .map(|&albedo| {
-                    let step = step * PRINTED.thick;
-                    let shots = (8.0 / step) as u32;
-                    let noise_mm = 0.001;
-                    let scene = Scene { step, shots, albedo, noise_mm, height: |_, _| 0.0, ..PRINTED };
-                    let (cloud, places) = scene.scan(3);
-                    let slope = by_slope(&cloud, &places, PRINTED.thick);
-                    let mut now = Vec::new();
-                    match Thick::of(&cloud, &places).unwrap() {
-                        None => now.clone_from(&cloud),
-                        Some(thick) => {
-                            let take = &mut |points: &[CloudPoint]| {
-                                now.extend_from_slice(points);
-                                Ok(())
-                            };
-                            thick.apply(&cloud, &places, take).unwrap();
-                        }
-                    }
-                    [cloud, slope, now]
-                })
-                .collect();
-            let rms = |kind: usize, least_mm: f64, most_mm: f64| {
-                let inner = |p: &&CloudPoint| {
-                    let x = f64::from(p.position.x) + 25.0;
-                    let bars = BARS[field(x - 25.0)];
-                    (1.0..9.0).contains(&x.rem_euclid(10.0)) && (least_mm..=most_mm).contains(&bars)
-                };
-                let all: Vec<f64> = scans
-                    .iter()
-                    .flat_map(|s| s[kind].iter().filter(inner).map(|p| f64::from(p.position.z).powi(2)))
-                    .collect();
-                1e3 * (all.iter().sum::<f64>() / all.len() as f64).sqrt()
-            };
-            for bars in BARS {
-                let [raw, slope, now] = [0, 1, 2].map(|kind| rms(kind, bars, bars));
-                println!("step of {step} sigma, bars of {bars} mm: {raw:.1}, {slope:.1}, {now:.1}");
-            }
-            // Narrower ones are hardly wider than a pixel, 0.25 mm.
-            let [raw, slope, now] = [0, 1, 2].map(|kind| rms(kind, 1.0, 3.0));
-            println!("step of {step} sigma, bars from 1 mm on: {raw:.1}, {slope:.1}, {now:.1}");
-            if now > most * slope {
-                faults.push(format!("step of {step} sigma: {slope:.1} -> {now:.1} um, allowed {most} of it"));
-            }
-        }
-        assert!(faults.is_empty(), "{}", faults.join("\n"));
     }
 }
