@@ -48,7 +48,7 @@ impl Exposures {
         near.map_or(0, |(i, _)| i)
     }
 
-    /// From now on one picture more is left out after each setting; their number, or none if there are enough.
+    /// From now on one picture more is excluded after each setting; their number, or none if there are enough.
     pub fn wait_longer(&self) -> Option<usize> {
         let more = self.more.load(Ordering::Relaxed) + 1;
         if more > MOST_MORE {
@@ -156,7 +156,7 @@ impl Bracketed {
         Ok(bracketed)
     }
 
-    /// The exposures, and what is told of them while this source runs.
+    /// The exposures, and the messages about them while this source runs.
     pub fn exposures(&self) -> Exposures {
         self.exposures.clone()
     }
@@ -182,7 +182,7 @@ impl Bracketed {
         Ok(())
     }
 
-    /// The source is lost, or does not do what it is told: then it is not opened again.
+    /// Reports that the source is lost. A source that refuses its settings is not opened again.
     fn lost(&mut self, fault: Fault) -> Event {
         self.failed += 1;
         self.refused |= fault.kind == Kind::Usage || self.failed >= MOST_FAILED;

@@ -12,7 +12,7 @@ const MOST_OF_ONE: usize = 8;
 /// Frames of a connection that are answered at once, and how many a second after those. A PLC asks every 10 ms.
 const AT_ONCE: f64 = 100.0;
 const A_SECOND: f64 = 200.0;
-/// Most characters of an error that is told.
+/// Most characters of the last error, as the page Settings shows it.
 const MOST_WORDS: usize = 160;
 
 /// What came over the wire since the start.

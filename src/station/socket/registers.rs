@@ -178,7 +178,7 @@ impl Registers {
         self.notation.labels().iter().map(|l| if l.ends_with(" mm") { PER_MM } else { PER_DEGREE })
     }
 
-    /// So many numbers of two registers.
+    /// `count` numbers of two registers each, the higher one first.
     fn numbers(&self, at: usize, count: usize) -> impl Iterator<Item = i32> {
         let words = &self.holding[at..at + 2 * count];
         words.chunks_exact(2).map(|w| (u32::from(w[0]) << 16 | u32::from(w[1])) as i32)

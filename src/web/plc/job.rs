@@ -49,7 +49,7 @@ pub(super) fn stored(jobs: &Jobs, job: &Job) -> Stored {
     Stored { phase: Some(state.phase), part: fresh.then(|| Part::load(&report).ok()).flatten() }
 }
 
-/// When a file was written; minus infinity if there is none.
+/// Time at which a file was written, seconds since 1970; minus infinity without a file.
 fn written_at(path: &Path) -> f64 {
     let written = path.metadata().and_then(|m| m.modified()).ok();
     let since = written.and_then(|t| t.duration_since(UNIX_EPOCH).ok());

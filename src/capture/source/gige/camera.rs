@@ -68,7 +68,7 @@ pub struct GigeCamera {
     readout: Option<Readout>,
     pixel_format: String,
     exposure_ns: Option<u64>,
-    /// Whether it takes a picture when it is told to (TriggerMode On, TriggerSource Software).
+    /// Whether software triggers each picture (TriggerMode On, TriggerSource Software).
     on_command: bool,
     /// ns per tick of its clock.
     tick_ns: f64,
