@@ -2,6 +2,7 @@
 # make demo   build, simulate a station, scan it, leave ./demo/index.html
 # make test   everything, on software Vulkan where it can be had
 # make gentl  the GenTL producer, by which GenICam programs see a 3-D camera: target/release/sheetlight.cti
+# make opcua  the OPC UA server beside a station: target/release/sheetlight-opcua
 # make bench  figures of this machine;  make bench-peers  side by side with OpenCV and numba
 
 CARGO ?= cargo
@@ -10,8 +11,8 @@ VENV := .venv
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 export XDG_RUNTIME_DIR ?= $(shell mktemp -d /tmp/sheetlight-run.XXXXXX)
 
-.PHONY: station browser demo pages book lint test gentl bench bench-entries bench-peers vulkan python notebooks pictures \
-	cameras build clean
+.PHONY: station browser demo pages book lint test gentl opcua bench bench-entries bench-peers vulkan python notebooks \
+	pictures cameras build clean
 
 demo: vulkan build
 	$(TARGET)/release/sheetlight demo --out demo
@@ -23,10 +24,12 @@ station: vulkan build
 build:
 	$(CARGO) build --release --locked
 
-# All packages at once: so the library has the same features for all of them, and is compiled once.
+# All packages at once: so the library has the same features for all of them, and is compiled once. The OPC UA server has
+# nothing of the library; its test runs the program that was built before.
 test: vulkan python cameras browser lint
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(if $(SHEETLIGHT_REQUIRE_GPU),,SHADER_TWIN_ALLOW_SKIP=1) \
 		$(CARGO) test --locked --package sheetlight --package shader-twin --package sheetlight-gentl -- --show-output
+	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(CARGO) test --locked --package sheetlight-opcua -- --show-output
 
 # A toolchain without clippy says so and goes on.
 # The pages of the screen: format and types.
@@ -40,7 +43,8 @@ book:
 lint: pages book
 	if $(CARGO) clippy --version >/dev/null 2>&1; then \
 		$(CARGO) clippy --locked --package sheetlight --package shader-twin --package sheetlight-gentl --all-targets \
-			-- -D warnings; \
+			-- -D warnings && \
+		$(CARGO) clippy --locked --package sheetlight-opcua --all-targets -- -D warnings; \
 	else echo "clippy is not installed: skipped"; fi
 	$(CARGO) check --locked --package outside
 	if $(CARGO) clippy --version >/dev/null 2>&1; then \
@@ -51,6 +55,10 @@ lint: pages book
 gentl:
 	$(CARGO) build --release --locked --package sheetlight-gentl
 	cp -f $(TARGET)/release/libsheetlight_gentl.so $(TARGET)/release/sheetlight.cti
+
+# The OPC UA server beside a station.
+opcua:
+	$(CARGO) build --release --locked --package sheetlight-opcua
 
 bench: vulkan build
 	$(TARGET)/release/sheetlight bench
