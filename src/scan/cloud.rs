@@ -49,6 +49,10 @@ impl CloudPoint {
 const RECORD: u64 = size_of::<CloudPoint>() as u64;
 /// The count is written in this many characters so that it can be replaced in place.
 const COUNT_DIGITS: usize = 20;
+/// Type of `shot` in the header. Open3D's tensor reader knows `int`, but leaves out a property of the type `uint`,
+/// which files of before had.
+const SHOT: &str = "int";
+const EARLIER_SHOT: &str = "uint";
 const PROPERTIES: [(&str, &str); 9] = [
     ("float", "x"),
     ("float", "y"),
@@ -56,7 +60,7 @@ const PROPERTIES: [(&str, &str); 9] = [
     ("float", "sigma_mm"),
     ("float", "intensity"),
     ("float", "quality"),
-    ("uint", "shot"),
+    (SHOT, "shot"),
     ("float", "u"),
     ("float", "v"),
 ];
@@ -74,6 +78,11 @@ fn header(count: u64, frame: &str) -> String {
         text += &format!("property {kind} {name}\n");
     }
     text + "end_header\n"
+}
+
+/// The same header as it was written before.
+fn earlier(header: &str) -> String {
+    header.replace(&format!("property {SHOT} shot"), &format!("property {EARLIER_SHOT} shot"))
 }
 
 /// Any source that can hand out its points in chunks, more than once.
@@ -132,7 +141,8 @@ impl CloudWriter {
         }
         let mut file = File::options().read(true).write(true).open(&part).map_err(|e| Fault::read(&part, e))?;
         // The header may hold the final count already.
-        let head = head_of(&mut file).map_err(|e| Fault::read(&part, e))?;
+        // An earlier header has another length: `finish` could not replace its count.
+        let head = head_of(&mut file).map_err(|e| Fault::read(&part, e))?.filter(|h| !h.earlier);
         let length = file.metadata().map_err(|e| Fault::read(&part, e))?.len();
         let (frame, start) = head.as_ref().map_or((FRAMES[0], 0), |h| (h.frame, h.length));
         // Saturating: a count that no file can hold gives a length that no file has.
@@ -195,24 +205,29 @@ struct Head {
     count: u64,
     /// Bytes.
     length: u64,
+    /// Whether it is as it was written before.
+    earlier: bool,
 }
 
 /// `None` if the file does not begin with such a header.
 fn head_of(file: &mut File) -> std::io::Result<Option<Head>> {
-    let longest = FRAMES.iter().map(|f| header(0, f).len()).max().unwrap_or(0);
+    let longest = FRAMES.iter().map(|f| earlier(&header(0, f)).len()).max().unwrap_or(0);
     let mut bytes = Vec::with_capacity(longest);
     file.take(longest as u64).read_to_end(&mut bytes)?;
-    Ok(FRAMES.into_iter().find_map(|frame| {
-        let head = bytes.get(..header(0, frame).len())?;
-        Some(Head { frame, count: count_in(head, frame)?, length: head.len() as u64 })
+    let known = FRAMES.into_iter().flat_map(|frame| [(frame, false), (frame, true)]);
+    Ok(known.into_iter().find_map(|(frame, is_earlier)| {
+        let written = |count| if is_earlier { earlier(&header(count, frame)) } else { header(count, frame) };
+        let head = bytes.get(..written(0).len())?;
+        let count = count_in(head)?;
+        let same = written(count).as_bytes() == head;
+        same.then_some(Head { frame, count, length: head.len() as u64, earlier: is_earlier })
     }))
 }
 
-/// The count in a header that this program wrote; `None` for any other header.
-fn count_in(head: &[u8], frame: &str) -> Option<u64> {
+/// The count that a header states.
+fn count_in(head: &[u8]) -> Option<u64> {
     let text = std::str::from_utf8(head).ok()?;
-    let count = text.lines().find_map(|l| l.strip_prefix("element vertex "))?.parse().ok()?;
-    (header(count, frame).as_bytes() == head).then_some(count)
+    text.lines().find_map(|l| l.strip_prefix("element vertex "))?.parse().ok()
 }
 
 fn part_of(path: &Path) -> PathBuf {
@@ -248,7 +263,7 @@ impl CloudFile {
                 .next("give the cloud.ply of a sheetlight scan")
         };
         let head = head_of(&mut file).map_err(|e| Fault::read(path, e))?;
-        let Head { count, length: start, frame } =
+        let Head { count, length: start, frame, .. } =
             head.ok_or_else(|| strange("is too short for a cloud, or has another header"))?;
         let needed = count.saturating_mul(RECORD).saturating_add(start);
         if length != needed {
@@ -336,6 +351,23 @@ mod tests {
         assert_eq!(file.vertex.len(), 20);
         let row = &file.vertex[15];
         assert_eq!((row.x, row.z, row.shot, row.u), (15.0, -2.0, 2, 3.75));
+    }
+
+    #[test]
+    fn clouds_with_the_earlier_header_are_read_and_not_resumed() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cloud.ply");
+        let points = some(30);
+        for frame in FRAMES {
+            let mut bytes = earlier(&header(30, frame)).into_bytes();
+            assert!(String::from_utf8_lossy(&bytes).contains("property uint shot"));
+            bytes.extend(bytemuck::cast_slice::<CloudPoint, u8>(&points));
+            std::fs::write(&path, &bytes).unwrap();
+            assert_eq!(read_cloud(&path).unwrap(), points);
+            assert_eq!(CloudFile::open(&path).unwrap().frame(), frame);
+            std::fs::write(part_of(&path), &bytes).unwrap();
+            assert!(CloudWriter::resume(&path, 30).is_err());
+        }
     }
 
     #[test]

@@ -28,7 +28,7 @@ def write(file: Path, organised: Organised, about: About) -> None:
         f"obj_info num_rows {rows}",
         f"element vertex {grid.size}",
     ]
-    lines += [f"property {'uint' if field == 'shot' else 'float'} {name}" for field, name in NAMES.items()]
+    lines += [f"property {'int' if field == 'shot' else 'float'} {name}" for field, name in NAMES.items()]
     with open(file, "wb") as out:
         out.write("\n".join([*lines, "end_header", ""]).encode("ascii"))
         grid.tofile(out)
