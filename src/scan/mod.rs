@@ -6,6 +6,7 @@ mod ambient;
 mod captured;
 mod carrier;
 mod cloud;
+mod ends;
 mod engine;
 mod extraction;
 mod foreign;

@@ -3,6 +3,7 @@
 //! Frame and unit: points in the carrier's frame (mostly the robot's base), mm (docs/math.md, Stripe peak; the
 //! paper's eq. 5 and 6).
 
+use super::ends;
 use super::engine::{Engine, Measured, Optical, StripeSeen};
 use super::{Along, Ambient, Carrier, CloudPoint, Extraction, Pictures, Place, Processor, Shot};
 use crate::camera::Intrinsics;
@@ -16,6 +17,7 @@ use crate::stages::peak::found::{Peak, SATURATED};
 use crate::stages::peak::params::PeakParams;
 use crate::stages::stripe::point::Optics;
 use crate::stages::support::{self, Support};
+use rayon::prelude::*;
 
 /// The result of one shot.
 #[derive(Clone, Debug)]
@@ -290,19 +292,26 @@ impl Scanner {
             let anchors = self.anchors().map(|a| place.from_camera.point(&a));
             measured.push(support::Profile { shot, cargo: place, peaks, points, anchors, pitch });
         }
-        let judged = match &mut self.support {
+        let mut judged = match &mut self.support {
             Some(support) => support.take(measured, all)?,
             None => Vec::new(),
         };
+        let (across, width) = (self.optics.across(), self.width_px());
+        let settings = &self.extraction.support;
+        judged.par_iter_mut().for_each(|p| ends::mark(&mut p.peaks, across, width, settings));
         let mut done = std::mem::take(&mut self.early);
         done.extend(judged.into_iter().map(|p| self.profile(p)));
         Ok(done)
     }
 
+    /// The stripe's Gaussian sigma.
+    fn width_px(&self) -> f32 {
+        self.built.map_or(1.0, |s| s.width_px)
+    }
+
     fn profile(&self, judged: support::Profile<Place>) -> Profile {
         let place = &judged.cargo;
-        let width = self.built.map_or(1.0, |s| s.width_px);
-        let limit = self.extraction.choose.uncertain * width;
+        let limit = self.extraction.choose.uncertain * self.width_px();
         let points = judged
             .peaks
             .iter()

@@ -20,15 +20,17 @@ pub enum Reject {
     Steep = 6,
     /// Much weaker than another peak on the same line across the stripe: a reflection.
     Echo = 7,
-    /// No neighbour in the shots before and after: a reflection or a speck.
+    /// No neighbour in the shots before and after, or none on its own line: a reflection or a speck.
     Unsupported = 8,
     /// The ray does not meet the laser plane in front of the camera, or the lens model has no ray there.
     NoPoint = 9,
+    /// Beyond the end of the surface: at a line's end, with less than half of the light inside or too wide.
+    Beyond = 10,
 }
 
 impl Reject {
     /// All reasons, in the order of their numbers.
-    pub const ALL: [Reject; 10] = [
+    pub const ALL: [Reject; 11] = [
         Reject::Kept,
         Reject::Region,
         Reject::Faint,
@@ -39,6 +41,7 @@ impl Reject {
         Reject::Echo,
         Reject::Unsupported,
         Reject::NoPoint,
+        Reject::Beyond,
     ];
     /// Name for reports and legends.
     pub fn words(self) -> &'static str {
@@ -53,6 +56,7 @@ impl Reject {
             Reject::Echo => "echo",
             Reject::Unsupported => "unsupported",
             Reject::NoPoint => "no point",
+            Reject::Beyond => "beyond an edge",
         }
     }
 }
@@ -99,7 +103,7 @@ impl Peak {
     }
     /// Why it was rejected; [`Reject::Kept`] if it was not.
     pub fn reject(&self) -> Reject {
-        Reject::ALL[(self.flags & REASON).min(9) as usize]
+        Reject::ALL[(self.flags & REASON).min(10) as usize]
     }
     /// Sets the reason, unless one is already set: the first test that fails determines it.
     pub fn refuse(&mut self, why: Reject) {
