@@ -127,7 +127,7 @@ const HOMES: &[(&str, &str)] = &[
     ("rs_opw_kinematics", "cell"),
     ("rumqttc", "web"),
     ("rust_embed", "web"),
-    ("saphyr_parser", "station"),
+    ("saphyr_parser", "files"),
     ("signal_hook", "cli"),
     ("tiff", "raster"),
     ("tokio", "web"),

@@ -1,6 +1,7 @@
 //! In: bytes of results and their names, paths of files that others wrote. Out: files that are whole or missing,
 //! sets of files that get their names together, folders that one process at a time writes into. Also: names in
-//! natural order, bytes and text within size limits, rows of tables, likely typing errors in text files.
+//! natural order, bytes and text within size limits, rows of tables, keys of YAML files, likely typing errors in text
+//! files.
 //! Frame and unit: none; bytes and paths.
 
 mod append;
@@ -17,6 +18,7 @@ mod slip;
 mod table;
 mod together;
 mod workplace;
+mod yaml;
 
 pub use append::Append;
 pub use atomic::{Aside, keep_all, write, write_aside, write_beside, write_unsynced};
@@ -32,3 +34,4 @@ pub use slip::{named, slip_at, slip_in};
 pub use table::{TableRow, table};
 pub use together::Together;
 pub use workplace::Workplace;
+pub use yaml::{parse as yaml, scalar as yaml_scalar};

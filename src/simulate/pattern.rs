@@ -10,8 +10,8 @@ pub struct Pattern {
     /// The description that the pattern was made from.
     pub board: BoardSpec,
     markers: Option<Markers>,
-    /// Centres of the dots of a circle grid.
-    dots: Vec<[f64; 2]>,
+    /// Centres of the dots of a circle grid, and the radius of the hole in each.
+    dots: Vec<[f64; 3]>,
 }
 
 impl Pattern {
@@ -19,7 +19,9 @@ impl Pattern {
     /// A ChArUco board whose markers its dictionary does not have.
     pub fn new(board: &BoardSpec) -> Result<Pattern> {
         let circles = matches!(board, BoardSpec::Circles { .. });
-        let dots = if circles { board.features().iter().map(|c| [c.x, c.y]).collect() } else { Vec::new() };
+        let mut dots: Vec<[f64; 3]> =
+            if circles { board.features().iter().map(|c| [c.x, c.y, 0.0]).collect() } else { Vec::new() };
+        board.drawn_holes().iter().for_each(|(k, diameter)| dots[*k][2] = diameter / 2.0);
         Ok(Pattern { board: board.clone(), markers: Markers::of(board)?, dots })
     }
 
@@ -41,7 +43,10 @@ impl Pattern {
             BoardSpec::MarkerGrid { .. } => self.markers.as_ref().is_some_and(|m| m.black_at(x, y)),
             BoardSpec::Circles { .. } => {
                 let r = self.board.drawn_diameter().unwrap_or(0.0) / 2.0;
-                self.dots.iter().any(|c| (x - c[0]).hypot(y - c[1]) <= r)
+                let first = self.board.drawn_first_diameter().unwrap_or(0.0) / 2.0;
+                self.board.on_frame(x, y)
+                    || x.hypot(y) <= first
+                    || self.dots.iter().any(|c| (c[2]..=r).contains(&(x - c[0]).hypot(y - c[1])))
             }
         }
     }

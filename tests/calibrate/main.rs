@@ -10,6 +10,7 @@ mod bad_input;
 mod ball_judge;
 mod camera_judge;
 mod commands;
+mod foreign_boards;
 mod foreign_cameras;
 mod guide;
 mod hand_eye_judge;

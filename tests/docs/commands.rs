@@ -9,13 +9,14 @@ use std::path::Path;
 use std::process::Command;
 
 /// Documents whose commands run one after the other in one folder, as a reader would type them.
-const FOLDERS: [&[&str]; 6] = [
+const FOLDERS: [&[&str]; 7] = [
     &["docs/getting-started.md", "docs/calibration.md", "docs/scanning.md", "docs/finding-and-inserting.md"],
     &["docs/hardware.md"],
     &["README.md"],
     &["docs/connections.md"],
     &["docs/archives.md"],
     &["docs/benchmark.md"],
+    &["docs/boards.md"],
 ];
 
 /// Blocks that cannot run in a test, by document. The numbers may only fall.
@@ -206,6 +207,11 @@ fn the_page_of_archives_shows_what_its_commands_print() {
 #[test]
 fn the_page_of_the_benchmark_shows_what_its_commands_print() {
     agree(FOLDERS[5]);
+}
+
+#[test]
+fn the_page_of_boards_shows_what_its_commands_print() {
+    agree(FOLDERS[6]);
 }
 
 #[test]

@@ -2,9 +2,9 @@
 //! visible markers with their ids, or the reason why no marker was found.
 //! Frame and unit: pixels; four ids per marker, clockwise from its upper left corner, markers row by row.
 
-use super::circles::mask;
+use super::mask::{DARK, mask};
 use super::quads::{QuadCorner, quads, refined};
-use super::refine::Grey;
+use super::refine::{Grey, Window, corner};
 use super::{BoardPoint, BoardView, FindOptions};
 use crate::calibrate::homography::{apply, homography};
 use crate::fault::{Fault, Result};
@@ -15,6 +15,12 @@ use calib_targets_aruco::Matcher;
 
 /// Smallest share of the cells in a marker's black ring that must be read as black.
 const RING: f64 = 0.9;
+
+/// Shares of the surroundings' mean for the search of markers whose corners touch black squares. Where blur joins
+/// them, only the lower shares part them; where light is poor, only the higher ones find them.
+const TOUCHING: [f64; 3] = [DARK, 0.6, 0.45];
+/// A fit of both squares at a corner is taken up to this distance from the crossing of the marker's edges, px.
+const BESIDE_PX: f64 = 0.5;
 
 /// A decoded marker: its index in the board's order, and its corners, starting with its own upper left.
 struct Seen {
@@ -33,7 +39,9 @@ pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<B
     let mut patches = 0;
     for shrink in if shrink > 1 { vec![shrink, 1] } else { vec![1] } {
         let small = grey.shrunk(shrink);
-        let found = quads(&mask(&small, true), small.width, small.height);
+        let shares = if board.corner_squares_mm().is_some() { &TOUCHING[..] } else { &TOUCHING[..1] };
+        let masks = shares.iter().map(|share| mask(&small, true, *share));
+        let found: Vec<[Vec2; 4]> = masks.flat_map(|m| quads(&m, small.width, small.height)).collect();
         patches += found.len();
         let full = |p: &Vec2| p.map(|c| (c + 0.5) * shrink as f64 - 0.5);
         for quad in found {
@@ -46,6 +54,10 @@ pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<B
     }
     let features = board.features();
     keep_agreeing(&mut seen, &features.iter().map(|f| f.xy()).collect::<Vec<_>>());
+    if let Some(side) = board.corner_squares_mm() {
+        let clear = (side / board.length_mm()).min(markers.ring() as f64 / markers.cells() as f64);
+        seen.iter_mut().for_each(|s| touch(&grey, &mut s.corners, clear));
+    }
     if seen.is_empty() {
         return Err(why_not(&markers, patches));
     }
@@ -67,15 +79,17 @@ pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<B
 fn read(grey: &Grey, quad: &[Vec2; 4], markers: &Markers, matcher: &Matcher) -> Option<Seen> {
     let cells = markers.cells();
     let n = cells as f64;
-    // The black ring is one cell wide, the white margin around it at least as wide; the start is accurate to a pixel.
-    let corners = refined(grey, quad, 0.55 / n)?;
+    let ring = markers.ring();
+    // The white margin is at least as wide as the black ring; the start is accurate to a pixel.
+    let corners = refined(grey, quad, 0.55 * ring as f64 / n)?;
     let square = [[0.0, 0.0], [n, 0.0], [n, n], [0.0, n]].map(Vec2::from);
     let h = homography(&square, &corners.map(|c| c.pixel))?;
     let levels = cell_levels(grey, &h, cells)?;
     let low = levels.iter().copied().fold(f64::INFINITY, f64::min);
     let high = levels.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let black = |k: usize| levels[k] < 0.5 * (low + high);
-    let ring = |k: usize| k.is_multiple_of(cells) || k / cells == 0 || k % cells == cells - 1 || k / cells == cells - 1;
+    let inside = |at: usize| (ring..cells - ring).contains(&at);
+    let ring = |k: usize| !inside(k % cells) || !inside(k / cells);
     let of_ring = (0..levels.len()).filter(|k| ring(*k));
     let dark = of_ring.clone().filter(|k| black(*k)).count() as f64;
     if dark < RING * of_ring.count() as f64 {
@@ -87,8 +101,24 @@ fn read(grey: &Grey, quad: &[Vec2; 4], markers: &Markers, matcher: &Matcher) -> 
     let place = markers.places().position(|(_, _, id)| id == found.id as usize)?;
     // The marker appears rotated clockwise by `rotation` quarter turns; its upper left corner is shifted by as many
     // indices.
-    let turn = found.rotation as usize;
+    let turn = found.rotation as usize + markers.turn();
     Some(Seen { place, corners: std::array::from_fn(|k| corners[(k + turn) % 4]) })
+}
+
+/// Replaces a marker's corners by fits of the crossing edges, where a black square touches the corner. Printing and
+/// exposure that make black wider move the marker's edges, but not the crossing. `clear`: length of the edges without
+/// other structures, as a share of the marker's side.
+fn touch(grey: &Grey, corners: &mut [QuadCorner; 4], clear: f64) {
+    let from = corners.map(|c| c.pixel);
+    for k in 0..4 {
+        let (u, v) = ((from[(k + 1) % 4] - from[k]) * 2.0 * clear, (from[(k + 3) % 4] - from[k]) * 2.0 * clear);
+        let window = Window { reach: 0.42, longest_px: 15.0, margin: 1.0 };
+        let Some(c) = corner(grey, &from[k], &u, &v, &window) else { continue };
+        // The quadrant between the edges is the marker's own, so it is dark.
+        if c.contrast < 0.0 && (c.pixel - from[k]).norm() < BESIDE_PX {
+            corners[k] = QuadCorner { pixel: c.pixel, sigma_px: c.sigma_px };
+        }
+    }
 }
 
 /// Mean intensity in the middle of each cell.

@@ -2,10 +2,10 @@
 //! Frame and unit: pixels (centres at integers); feature ids index `BoardSpec::features()`.
 
 mod chess;
-mod circles;
-mod ellipse;
+mod dots;
 pub mod extent;
 mod marker_grid;
+mod mask;
 mod other_size;
 pub mod print;
 mod quads;

@@ -2,7 +2,7 @@
 //! Frame and unit: millimetres on the sheet, x to the right, y down.
 
 use crate::fault::{Fault, Result};
-use crate::recording::{BoardSpec, Markers};
+use crate::recording::{BoardSpec, MarkerLayout, Markers, OriginMark};
 use std::fmt::Write;
 
 /// Black shapes on a white sheet.
@@ -16,6 +16,10 @@ pub struct Sheet {
     pub rectangles: Vec<[f64; 4]>,
     /// Black discs: centre x, y, radius, mm.
     pub discs: Vec<[f64; 3]>,
+    /// White discs on black ones: centre x, y, radius, mm.
+    pub holes: Vec<[f64; 3]>,
+    /// Black triangles: three corners each, mm.
+    pub triangles: Vec<[[f64; 2]; 3]>,
     /// Text under the board, outside its border.
     pub label: String,
 }
@@ -44,11 +48,22 @@ pub fn sheet(board: &BoardSpec) -> Result<Sheet> {
         BoardSpec::MarkerGrid { .. } => {
             let all = Markers::of(board)?.expect("a marker grid has markers");
             markers(&mut sheet, &all, [-x0, -y0]);
+            sheet.rectangles.extend(all.corner_squares().iter().map(|[x, y, side]| [x - x0, y - y0, *side, *side]));
         }
-        BoardSpec::Circles { .. } => {
+        BoardSpec::Circles { origin, border_mm, .. } => {
             let r = board.drawn_diameter().expect("a circle grid has dots") / 2.0;
             let discs = board.features().into_iter().map(|c| [c.x - x0, c.y - y0, r]);
             sheet.discs.extend(discs);
+            if let Some(first) = board.drawn_first_diameter() {
+                sheet.discs[0][2] = first / 2.0;
+            }
+            for (k, diameter) in board.drawn_holes() {
+                let [x, y, _] = sheet.discs[k];
+                sheet.holes.push([x, y, diameter / 2.0]);
+            }
+            if let Some(OriginMark::FrameCorner { bar_mm: bar, corner_mm, .. }) = origin {
+                frame(&mut sheet, *border_mm, [x1 - x0 - border_mm, y1 - y0 - border_mm], *bar, *corner_mm);
+            }
         }
     }
     let rule = sheet.width.min(100.0).floor();
@@ -110,7 +125,8 @@ fn fits(board: &BoardSpec) -> Result<()> {
         ),
         // Without a white margin of about a cell the marker's edges are not visible.
         BoardSpec::MarkerGrid { markers, marker_mm, gap_mm, border_mm, .. }
-            if (markers != &[1, 1] && *gap_mm < 0.15 * marker_mm) || *border_mm < 0.15 * marker_mm =>
+            if (markers != &[1, 1] && *gap_mm < 0.15 * marker_mm)
+                || border_mm + board.corner_squares_mm().unwrap_or(0.0) < 0.15 * marker_mm =>
         {
             let least = 0.15 * marker_mm;
             bad(
@@ -130,6 +146,20 @@ fn fits(board: &BoardSpec) -> Result<()> {
                 "choose dots of half the pitch",
             )
         }
+        BoardSpec::Circles { pitch_mm, origin: Some(OriginMark::LargerDot { .. }), .. } => {
+            let (small, first) = (board.drawn_diameter().unwrap_or(0.0), board.drawn_first_diameter().unwrap_or(0.0));
+            let most = 1.9 * pitch_mm - small;
+            if first < most {
+                return Ok(());
+            }
+            bad(
+                format!(
+                    "a first dot of {first} mm beside dots of {small} mm does not fit a pitch of {pitch_mm} mm: below \
+                     {most} mm"
+                ),
+                "choose dots of 0.4 of the pitch, and a first one twice as large",
+            )
+        }
         _ => Ok(()),
     }
 }
@@ -137,6 +167,15 @@ fn fits(board: &BoardSpec) -> Result<()> {
 fn squares(sheet: &mut Sheet, nx: u32, ny: u32, s: f64, x0: f64, y0: f64, odd: u32) {
     let black = (0..ny).flat_map(|j| (0..nx).map(move |i| (i, j))).filter(|(i, j)| (i + j) % 2 == odd);
     sheet.rectangles.extend(black.map(|(i, j)| [x0 + f64::from(i) * s, y0 + f64::from(j) * s, s, s]));
+}
+
+/// Four bars from (`low`, `low`) to `high`, and the triangle in the upper left corner.
+fn frame(sheet: &mut Sheet, low: f64, high: [f64; 2], bar: f64, corner: f64) {
+    let (w, h) = (high[0] - low, high[1] - low);
+    for at in [[low, low, w, bar], [low, high[1] - bar, w, bar], [low, low, bar, h], [high[0] - bar, low, bar, h]] {
+        sheet.rectangles.push(at);
+    }
+    sheet.triangles.push([[low, low], [low + corner, low], [low, low + corner]]);
 }
 
 /// Runs of black cells become one rectangle, so that the print has no hairlines between cells.
@@ -169,13 +208,20 @@ fn label(board: &BoardSpec) -> String {
         BoardSpec::Charuco { squares: [a, b], square_mm, marker_mm, dictionary, .. } => {
             format!("ChArUco, {a}x{b} squares of {square_mm} mm, markers {marker_mm} mm, {dictionary}")
         }
-        BoardSpec::MarkerGrid { markers: [a, b], marker_mm, gap_mm, dictionary, first_id, .. } => {
-            format!("{a}x{b} markers of {marker_mm} mm, gaps {gap_mm} mm, {dictionary} from {first_id}")
+        BoardSpec::MarkerGrid { markers: [a, b], marker_mm, gap_mm, dictionary, first_id, layout, .. } => {
+            let kind = if *layout == MarkerLayout::Kalibr { "AprilGrid, " } else { "" };
+            format!("{kind}{a}x{b} markers of {marker_mm} mm, gaps {gap_mm} mm, {dictionary} from {first_id}")
         }
-        BoardSpec::Circles { dots: [a, b], pitch_mm, asymmetric, .. } => {
+        BoardSpec::Circles { dots: [a, b], pitch_mm, asymmetric, origin, .. } => {
             let diameter_mm = board.drawn_diameter().unwrap_or(0.0);
-            let kind = if *asymmetric { "asymmetric" } else { "symmetric" };
-            format!("{kind} circles, {a}x{b}, pitch {pitch_mm} mm, diameter {diameter_mm} mm")
+            let kind = match (asymmetric, origin) {
+                (true, _) => "asymmetric circles",
+                (false, None) => "symmetric circles",
+                (false, Some(OriginMark::LargerDot { .. })) => "circles with a larger first one",
+                (false, Some(OriginMark::FrameCorner { .. })) => "circles in a frame",
+                (false, Some(OriginMark::FinderPatterns { .. })) => "circles with finder patterns",
+            };
+            format!("{kind}, {a}x{b}, pitch {pitch_mm} mm, diameter {diameter_mm} mm")
         }
     }
 }
@@ -193,9 +239,15 @@ impl Sheet {
         for [x, y, w, h] in &self.rectangles {
             let _ = write!(out, "M{x:.5} {y:.5}h{w:.5}v{h:.5}h{:.5}z", -w);
         }
+        for [a, b, c] in &self.triangles {
+            let _ = write!(out, "M{:.5} {:.5}L{:.5} {:.5}L{:.5} {:.5}z", a[0], a[1], b[0], b[1], c[0], c[1]);
+        }
         out.push_str("\"/>");
         for [x, y, r] in &self.discs {
             let _ = write!(out, "<circle cx=\"{x:.5}\" cy=\"{y:.5}\" r=\"{r:.5}\"/>");
+        }
+        for [x, y, r] in &self.holes {
+            let _ = write!(out, "<circle cx=\"{x:.5}\" cy=\"{y:.5}\" r=\"{r:.5}\" fill=\"#fff\"/>");
         }
         let _ = writeln!(
             out,
@@ -216,9 +268,21 @@ impl Sheet {
         for [x, y, w, h] in &self.rectangles {
             let _ = writeln!(draw, "{:.4} {:.4} {:.4} {:.4} re", x * k, flip(y + h), w * k, h * k);
         }
+        for corners in &self.triangles {
+            for ([x, y], draws) in corners.iter().zip(["m", "l", "l h"]) {
+                let _ = writeln!(draw, "{:.4} {:.4} {draws}", x * k, flip(*y));
+            }
+        }
         draw.push_str("f\n");
         for [x, y, r] in &self.discs {
             disc(&mut draw, x * k, flip(*y), r * k);
+        }
+        if !self.holes.is_empty() {
+            draw.push_str("1 g\n");
+            for [x, y, r] in &self.holes {
+                disc(&mut draw, x * k, flip(*y), r * k);
+            }
+            draw.push_str("0 g\n");
         }
         // Characters of Helvetica are about half as wide as high.
         let left = (self.width / 2.0 - self.label.len() as f64 * 2.6 * 0.25) * k;
@@ -290,6 +354,7 @@ mod tests {
             pitch_mm: 10.0,
             diameter_mm: Some(9.5),
             asymmetric: false,
+            origin: None,
             border_mm: 6.0,
         };
         for (board, words) in [

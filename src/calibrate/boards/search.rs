@@ -3,8 +3,9 @@
 //! Frame and unit: pixels (centres at integers); feature ids index `BoardSpec::features()`.
 
 use super::chess::{charuco, chessboard};
+use super::dots::circles;
+use super::marker_grid;
 use super::view::{BoardView, FindOptions};
-use super::{circles, marker_grid};
 use crate::fault::Result;
 use crate::raster::{Image, Light};
 use crate::recording::BoardSpec;

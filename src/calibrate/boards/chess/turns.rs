@@ -41,7 +41,8 @@ fn colours_agree(board: &BoardSpec, quarter: u32) -> bool {
             (nx + ny) % 2 == 0 && (quarter == 2 || (nx == ny && nx % 2 == 0))
         }
         BoardSpec::Charuco { .. } | BoardSpec::MarkerGrid { .. } => false,
-        BoardSpec::Circles { .. } => true,
+        // A mark at the first dot leaves one reading.
+        BoardSpec::Circles { origin, .. } => origin.is_none(),
     }
 }
 
@@ -58,12 +59,20 @@ impl BoardView {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recording::OriginMark;
 
     fn chessboard(nx: u32, ny: u32) -> BoardSpec {
         BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm: 10.0, border_mm: 0.0, first_square: "black".into() }
     }
     fn circles(nx: u32, ny: u32, asymmetric: bool) -> BoardSpec {
-        BoardSpec::Circles { dots: [nx, ny], pitch_mm: 10.0, diameter_mm: Some(5.0), asymmetric, border_mm: 0.0 }
+        BoardSpec::Circles {
+            dots: [nx, ny],
+            pitch_mm: 10.0,
+            diameter_mm: Some(5.0),
+            asymmetric,
+            origin: None,
+            border_mm: 0.0,
+        }
     }
 
     #[test]
@@ -73,6 +82,11 @@ mod tests {
         assert_eq!((count(&chessboard(8, 6)), count(&chessboard(9, 7))), (2, 2));
         assert_eq!((count(&chessboard(7, 7)), count(&chessboard(8, 8))), (2, 4));
         assert_eq!((count(&circles(7, 5, false)), count(&circles(6, 6, false))), (2, 4));
+        let mut marked = circles(7, 7, false);
+        if let BoardSpec::Circles { origin, .. } = &mut marked {
+            *origin = Some(OriginMark::LargerDot { diameter_mm: None });
+        }
+        assert_eq!((count(&circles(7, 7, false)), count(&marked)), (4, 1));
         assert_eq!((count(&circles(4, 11, true)), count(&circles(4, 10, true))), (1, 2));
     }
 }

@@ -4,7 +4,6 @@ mod cameras;
 mod halcon;
 mod tree;
 mod write;
-mod yaml;
 
 pub use cameras::camera;
 pub use write::{Format, written};

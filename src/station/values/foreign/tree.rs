@@ -1,6 +1,5 @@
 //! The keys of a calibration file in YAML, XML or JSON.
 
-use super::yaml;
 use crate::fault::{Fault, Result};
 use serde_json::{Map, Value};
 
@@ -14,7 +13,7 @@ pub fn read(text: &str) -> Result<Value> {
                 .cause(crate::files::slip_in(text, e.line(), "a truncated or edited file"))
                 .next("write the calibration again")
         }),
-        _ => yaml::parse(text),
+        _ => crate::files::yaml(text),
     }
 }
 
@@ -63,7 +62,7 @@ fn xml(text: &str) -> Result<Value> {
 
 /// One word is a scalar, several are a list.
 fn words(text: &str) -> Value {
-    let mut all: Vec<Value> = text.split_whitespace().map(yaml::scalar).collect();
+    let mut all: Vec<Value> = text.split_whitespace().map(crate::files::yaml_scalar).collect();
     if all.len() == 1 { all.remove(0) } else { Value::Array(all) }
 }
 

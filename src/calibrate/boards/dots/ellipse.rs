@@ -2,8 +2,8 @@
 //! (docs/math.md, Corners (4) and (5)).
 //! Frame and unit: pixels; grey levels.
 
-use super::refine::{Grey, erf};
-use super::sandwich::place_variance;
+use super::super::refine::{Grey, erf};
+use super::super::sandwich::place_variance;
 use crate::geometry::Vec2;
 use nalgebra::{Matrix2, SMatrix, SVector};
 
@@ -20,11 +20,11 @@ pub struct Dot {
 const PARAMETERS: usize = 10;
 
 /// Fits a blurred elliptic edge: I = (1 + g·q) (m + c erf(d/√2s)), with d the distance from qᵀAq = 1 to first order.
-/// `shape` is the start value of A (1/px²). Any symmetric blur keeps the pattern symmetric about the centre. `None`
+/// `shape` is the start value of A (1/px²). Pixels up to `reach` radii from the centre are used, and at least 2 px
+/// beyond the edge. Any symmetric blur keeps the pattern symmetric about the centre. `None`
 /// if the picture shows no such edge.
-pub fn dot(grey: &Grey, start: &Vec2, shape: &Matrix2<f64>) -> Option<Dot> {
+pub fn dot(grey: &Grey, start: &Vec2, shape: &Matrix2<f64>, reach: f64) -> Option<Dot> {
     let covariance = shape.try_inverse()?;
-    let reach = 1.5;
     let (hx, hy) = (covariance[(0, 0)].sqrt() * reach + 2.0, covariance[(1, 1)].sqrt() * reach + 2.0);
     let (x0, x1) = ((start.x - hx).ceil(), (start.x + hx).floor());
     let (y0, y1) = ((start.y - hy).ceil(), (start.y + hy).floor());

@@ -2,9 +2,9 @@
 //! Frame and unit: board frame, mm. Chessboard: origin in the first inner corner, x along the columns, y along the
 //! rows, z into the board. ChArUco: origin in the outer corner of the first square.
 
+use super::mark::OriginMark;
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec3;
-use std::path::Path;
 
 /// A calibration target as a description file or meta.json states it.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -62,6 +62,12 @@ pub enum BoardSpec {
         /// White margin around the outer markers, mm, 0..=10000; 0 unless stated.
         #[serde(default)]
         border_mm: f64,
+        /// How the markers are arranged and turned; "opencv" unless stated.
+        #[serde(default, skip_serializing_if = "MarkerLayout::is_opencv")]
+        layout: MarkerLayout,
+        /// Width of a marker's black ring in cells, 1 or 2; unless stated 1, and 2 in Kalibr's layout.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        ring_cells: Option<u32>,
     },
     /// Dots on a square grid [columns, rows]; asymmetric grids shift every other row by half a pitch.
     Circles {
@@ -75,11 +81,32 @@ pub enum BoardSpec {
         /// OpenCV's layout: odd rows are shifted by `pitch_mm`.
         #[serde(default)]
         asymmetric: bool,
+        /// Mark that shows which way round the grid lies; none unless stated.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        origin: Option<OriginMark>,
         /// Plain margin around the outer dots, mm, 0..=10000; 0 unless stated. It is counted from the dots' centres
         /// if no diameter is stated.
         #[serde(default)]
         border_mm: f64,
     },
+}
+
+/// How a grid's markers are arranged and turned.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MarkerLayout {
+    /// Ids row by row from the upper left; markers as OpenCV draws them.
+    #[default]
+    Opencv,
+    /// Kalibr's AprilGrid: ids row by row from the lower left, upward; tags as the AprilTag project draws them, half
+    /// a turn from OpenCV's; a black square in each corner between the tags, as wide as the gap.
+    Kalibr,
+}
+
+impl MarkerLayout {
+    fn is_opencv(&self) -> bool {
+        *self == MarkerLayout::Opencv
+    }
 }
 
 fn black() -> String {
@@ -91,20 +118,8 @@ fn is_zero(number: &u32) -> bool {
 }
 
 impl BoardSpec {
-    /// Reads a board's description file, as `sheetlight board` writes it.
-    pub fn load(path: &Path) -> Result<BoardSpec> {
-        let text = crate::files::read_text(path)?;
-        let board: BoardSpec = serde_json::from_str(&text).map_err(|e| {
-            Fault::input(format!("{}: is not a board description: {e}", path.display()))
-                .cause(crate::files::slip_in(&text, e.line(), "a misspelt key or a missing size"))
-                .next("compare it with docs/file-formats.md, or write one with sheetlight board")
-        })?;
-        board.check().map_err(|e| e.at(path.display()))?;
-        Ok(board)
-    }
-
     /// Refuses an impossible board.
-    pub(super) fn check(&self) -> Result<()> {
+    pub(in crate::recording) fn check(&self) -> Result<()> {
         let (count, what, least, border) = match self {
             BoardSpec::Chessboard { inner_corners, border_mm, .. } => (inner_corners, "inner corners", 2, border_mm),
             BoardSpec::Charuco { squares, border_mm, .. } => (squares, "squares", 3, border_mm),
@@ -144,6 +159,15 @@ impl BoardSpec {
             {
                 let least = 0.1 * marker_mm;
                 refuse(format!("the board's gap_mm is {gap_mm}, {least} (a tenth of marker_mm) to 10000 mm is allowed"))
+            }
+            BoardSpec::MarkerGrid { ring_cells: Some(cells), .. } if !(1..=2).contains(cells) => {
+                refuse(format!("the board's ring_cells is {cells}, 1 or 2 is allowed"))
+            }
+            BoardSpec::Circles { asymmetric: true, origin: Some(_), .. } => {
+                refuse("the board is an asymmetric grid and has an origin mark, only square grids have one".into())
+            }
+            BoardSpec::Circles { dots, pitch_mm, diameter_mm, origin: Some(mark), .. } => {
+                mark.refusal(*pitch_mm, *diameter_mm, *dots).map_or(Ok(()), refuse)
             }
             BoardSpec::Chessboard { first_square: colour, .. }
             | BoardSpec::Charuco { first_square: Some(colour), .. }
@@ -191,6 +215,34 @@ impl BoardSpec {
         }
     }
 
+    /// Diameter at which a circle grid's larger first dot is drawn, mm: twice that of the others unless stated.
+    /// `None` if all dots are equal.
+    pub fn drawn_first_diameter(&self) -> Option<f64> {
+        match self {
+            BoardSpec::Circles { origin: Some(OriginMark::LargerDot { diameter_mm }), .. } => {
+                diameter_mm.or(self.drawn_diameter().map(|d| 2.0 * d))
+            }
+            _ => None,
+        }
+    }
+
+    /// Width of a marker's black ring, in cells.
+    pub fn ring_cells(&self) -> u32 {
+        match self {
+            BoardSpec::MarkerGrid { ring_cells: Some(cells), .. } => *cells,
+            BoardSpec::MarkerGrid { layout: MarkerLayout::Kalibr, .. } => 2,
+            _ => 1,
+        }
+    }
+
+    /// Side of the black squares between the markers of Kalibr's layout, mm; `None` without them.
+    pub fn corner_squares_mm(&self) -> Option<f64> {
+        match self {
+            BoardSpec::MarkerGrid { layout: MarkerLayout::Kalibr, gap_mm, .. } => Some(*gap_mm),
+            _ => None,
+        }
+    }
+
     /// The key that states the size of the board's cells, mm: every length on the board scales with it.
     pub fn length_key(&self) -> &'static str {
         match self {
@@ -233,7 +285,9 @@ impl BoardSpec {
                     .collect()
             }
             BoardSpec::Circles { dots: [nx, ny], pitch_mm, asymmetric, .. } => lattice(*nx, *ny, |i, j| {
-                if *asymmetric {
+                if self.is_hexagonal() {
+                    [(f64::from(i) - 0.5 * f64::from(j % 2)) * pitch_mm, f64::from(j) * ROWS * pitch_mm]
+                } else if *asymmetric {
                     [f64::from(2 * i + j % 2) * pitch_mm, f64::from(j) * pitch_mm]
                 } else {
                     [f64::from(i) * pitch_mm, f64::from(j) * pitch_mm]
@@ -251,18 +305,67 @@ impl BoardSpec {
                 [-b, -b, f64::from(*nx) * s + b, f64::from(*ny) * s + b]
             }
             BoardSpec::MarkerGrid { markers: [nx, ny], marker_mm: m, gap_mm: g, border_mm: b, .. } => {
+                let b = b + self.corner_squares_mm().unwrap_or(0.0);
                 let side = |n: u32| f64::from(n) * (m + g) - g + b;
                 [-b, -b, side(*nx), side(*ny)]
             }
-            BoardSpec::Circles { dots: [nx, ny], pitch_mm: p, diameter_mm: d, asymmetric, border_mm: b } => {
-                let columns = if *asymmetric { f64::from(2 * nx - 1) } else { f64::from(nx - 1) };
+            BoardSpec::Circles { pitch_mm: p, diameter_mm: d, origin, border_mm: b, .. } => {
+                let [far_x, far_y] = self.far_dot(*p);
                 // An area that is not known to be printed does not count as board.
-                let r = d.unwrap_or(0.0) / 2.0 + b;
-                [-r, -r, columns * p + r, f64::from(ny - 1) * p + r]
+                let r = d.unwrap_or(0.0) / 2.0;
+                let (low, high) = match origin {
+                    Some(OriginMark::FrameCorner { frame_mm, .. }) => (*frame_mm, *frame_mm),
+                    Some(OriginMark::LargerDot { diameter_mm: Some(first) }) => (first / 2.0, r),
+                    _ => (r, r),
+                };
+                let left = if self.is_hexagonal() { 0.5 * p } else { 0.0 };
+                [-left - low - b, -low - b, far_x + high + b, far_y + high + b]
             }
         }
     }
 }
+
+impl BoardSpec {
+    /// Largest x and y of a circle grid's dots, mm.
+    fn far_dot(&self, pitch_mm: f64) -> [f64; 2] {
+        match self {
+            BoardSpec::Circles { dots: [nx, ny], asymmetric, .. } => {
+                let columns = if *asymmetric { 2 * nx - 1 } else { nx - 1 };
+                let rows = if self.is_hexagonal() { ROWS } else { 1.0 };
+                [f64::from(columns) * pitch_mm, f64::from(ny - 1) * rows * pitch_mm]
+            }
+            _ => [0.0; 2],
+        }
+    }
+
+    /// Whether a circle grid's rows are shifted by half a pitch, as HALCON's finder patterns imply.
+    pub fn is_hexagonal(&self) -> bool {
+        matches!(self, BoardSpec::Circles { origin: Some(OriginMark::FinderPatterns { .. }), .. })
+    }
+
+    /// The holes of finder patterns as they are drawn: index of the feature, and diameter in mm.
+    pub fn drawn_holes(&self) -> Vec<(usize, f64)> {
+        let BoardSpec::Circles { dots, origin: Some(OriginMark::FinderPatterns { at }), .. } = self else {
+            return Vec::new();
+        };
+        let diameter = HOLE * self.drawn_diameter().unwrap_or(0.0);
+        let index = |[i, j]: [i32; 2]| j as usize * dots[0] as usize + i as usize;
+        OriginMark::holes(at).into_iter().map(|hole| (index(hole), diameter)).collect()
+    }
+
+    /// Whether a point lies on the frame of a circle grid, its triangle included.
+    pub fn on_frame(&self, x: f64, y: f64) -> bool {
+        match self {
+            BoardSpec::Circles { origin: Some(mark), pitch_mm, .. } => mark.frame_at(self.far_dot(*pitch_mm), x, y),
+            _ => false,
+        }
+    }
+}
+
+/// Distance of two rows of a hexagonal arrangement over the pitch: half the square root of 3.
+const ROWS: f64 = 0.866_025_403_784_438_6;
+/// Diameter of a finder pattern's holes over that of the marks, as measured in pictures of a plate.
+const HOLE: f64 = 0.37;
 
 fn lattice(nx: u32, ny: u32, at: impl Fn(u32, u32) -> [f64; 2]) -> Vec<Vec3> {
     (0..ny)

@@ -1,7 +1,7 @@
 //! In: the description of a board with markers. Out: which cells of its markers are printed black.
 //! Frame and unit: board frame, mm; rows and columns of cells counted from the marker's upper left.
 
-use super::BoardSpec;
+use super::spec::{BoardSpec, MarkerLayout};
 use crate::fault::{Fault, Result};
 use calib_targets_aruco::{Dictionary, resolve_dictionary};
 
@@ -18,6 +18,9 @@ pub struct Markers {
     /// (0). There a marker is in the middle of its cell. `None`: every cell has a marker.
     white: Option<u32>,
     first_id: usize,
+    layout: MarkerLayout,
+    /// Width of the black ring, cells.
+    ring: usize,
 }
 
 impl Markers {
@@ -54,7 +57,12 @@ impl Markers {
             return Err(Fault::usage(format!("the board needs {needed} markers, {name} has {}", codes.codes().len()))
                 .next("choose a larger dictionary, a smaller board or a lower first_id"));
         }
-        Ok(Some(Markers { codes, cells, pitch_mm, marker_mm, white, first_id }))
+        let layout = match board {
+            BoardSpec::MarkerGrid { layout, .. } => *layout,
+            _ => MarkerLayout::Opencv,
+        };
+        let ring = board.ring_cells() as usize;
+        Ok(Some(Markers { codes, cells, pitch_mm, marker_mm, white, first_id, layout, ring }))
     }
     /// The dictionary of its markers.
     pub fn dictionary(&self) -> Dictionary {
@@ -62,7 +70,15 @@ impl Markers {
     }
     /// Number of cells across a marker, including its black ring.
     pub fn cells(&self) -> usize {
-        self.codes.marker_size() + 2
+        self.codes.marker_size() + 2 * self.ring
+    }
+    /// Width of the black ring, cells.
+    pub fn ring(&self) -> usize {
+        self.ring
+    }
+    /// Quarter turns, clockwise, from the markers as OpenCV draws them to those of the board.
+    pub fn turn(&self) -> usize {
+        if self.layout == MarkerLayout::Kalibr { 2 } else { 0 }
     }
     /// Side of a cell, mm.
     pub fn cell_mm(&self) -> f64 {
@@ -71,9 +87,13 @@ impl Markers {
     /// Positions of the markers: column, row and the marker's id.
     pub fn places(&self) -> impl Iterator<Item = (u32, u32, usize)> + use<> {
         let ([nx, ny], white, first) = (self.cells, self.white, self.first_id);
+        let upward = self.layout == MarkerLayout::Kalibr;
         let all = (0..ny).flat_map(move |j| (0..nx).map(move |i| (i, j)));
         let with = all.filter(move |(i, j)| white.is_none_or(|w| (i + j) % 2 == w));
-        with.enumerate().map(move |(k, (i, j))| (i, j, first + k))
+        with.enumerate().map(move |(k, (i, j))| {
+            let k = if upward { ((ny - 1 - j) * nx + i) as usize } else { k };
+            (i, j, first + k)
+        })
     }
     /// Upper left corner of the marker at (i, j).
     pub fn corner(&self, i: u32, j: u32) -> [f64; 2] {
@@ -82,14 +102,40 @@ impl Markers {
     }
     /// Whether a cell of marker `id` is black. A code holds the cells row by row from the lowest bit; 1 is black.
     pub fn black(&self, id: usize, column: usize, row: usize) -> bool {
-        let bits = self.codes.marker_size();
-        let ring = row == 0 || column == 0 || row > bits || column > bits;
-        ring || self.codes.codes()[id] >> ((row - 1) * bits + column - 1) & 1 == 1
+        let (bits, ring) = (self.codes.marker_size(), self.ring);
+        let inside = |n: usize| (ring..ring + bits).contains(&n);
+        if !inside(row) || !inside(column) {
+            return true;
+        }
+        let bit = (row - ring) * bits + column - ring;
+        let bit = if self.turn() == 2 { bits * bits - 1 - bit } else { bit };
+        self.codes.codes()[id] >> bit & 1 == 1
     }
-    /// Whether a point of the board lies on a black cell of a marker.
+    /// Whether a point lies on one of the black squares in the corners between the markers.
+    fn in_corner_square(&self, x: f64, y: f64) -> bool {
+        let gap = self.pitch_mm - self.marker_mm;
+        let on = |at: f64, n: u32| {
+            let from = (at + gap) / self.pitch_mm;
+            (0.0..f64::from(n + 1)).contains(&from) && from.fract() * self.pitch_mm < gap
+        };
+        self.layout == MarkerLayout::Kalibr && on(x, self.cells[0]) && on(y, self.cells[1])
+    }
+    /// The black squares in the corners between the markers: left, top and side, mm.
+    pub fn corner_squares(&self) -> Vec<[f64; 3]> {
+        if self.layout != MarkerLayout::Kalibr {
+            return Vec::new();
+        }
+        let (gap, [nx, ny]) = (self.pitch_mm - self.marker_mm, self.cells);
+        let at = |k: u32| f64::from(k) * self.pitch_mm - gap;
+        (0..=ny).flat_map(|j| (0..=nx).map(move |i| [at(i), at(j), gap])).collect()
+    }
+    /// Whether a point of the board lies on a black cell of a marker, or on a square between markers.
     pub fn black_at(&self, x: f64, y: f64) -> bool {
         let (i, j) = ((x / self.pitch_mm).floor(), (y / self.pitch_mm).floor());
         let [nx, ny] = self.cells.map(f64::from);
+        if self.in_corner_square(x, y) {
+            return true;
+        }
         if !(i >= 0.0 && j >= 0.0 && i < nx && j < ny) {
             return false;
         }
@@ -100,7 +146,8 @@ impl Markers {
         let [x0, y0] = self.corner(i, j);
         let (c, r) = (((x - x0) / self.cell_mm()).floor(), ((y - y0) / self.cell_mm()).floor());
         let n = self.cells() as f64;
-        let before = j * self.cells[0] + i;
+        let row = if self.layout == MarkerLayout::Kalibr { self.cells[1] - 1 - j } else { j };
+        let before = row * self.cells[0] + i;
         // Every second square before a white one is white.
         let id = self.first_id + if self.white.is_some() { before / 2 } else { before } as usize;
         c >= 0.0 && r >= 0.0 && c < n && r < n && self.black(id, c as usize, r as usize)
@@ -135,10 +182,16 @@ mod tests {
             dictionary: "DICT_APRILTAG_36h11".into(),
             first_id: 40,
             border_mm: 2.0,
+            layout: MarkerLayout::Opencv,
+            ring_cells: None,
         };
+        let mut kalibr = grid.clone();
+        if let BoardSpec::MarkerGrid { layout, .. } = &mut kalibr {
+            *layout = MarkerLayout::Kalibr;
+        }
         let charuco = [[5, 4], [6, 5], [7, 3]].map(|s| (board(s, "DICT_5X5_250"), s[0] * s[1] / 2));
         let begin_white = [(white([5, 4], 0), 10), (white([6, 5], 3), 15), (white([7, 3], 9), 11)];
-        for (squares, count) in charuco.into_iter().chain(begin_white).chain([(grid, 12)]) {
+        for (squares, count) in charuco.into_iter().chain(begin_white).chain([(grid, 12), (kalibr, 12)]) {
             let m = Markers::of(&squares).unwrap().unwrap();
             assert_eq!(m.places().count(), count as usize);
             for (i, j, k) in m.places() {
@@ -147,9 +200,36 @@ mod tests {
                     let middle = |from: f64, n: usize| from + (n as f64 + 0.5) * m.cell_mm();
                     assert_eq!(m.black_at(middle(x, c), middle(y, r)), m.black(k, c, r), "{squares:?} {k} {c} {r}");
                 }
-                assert!(!m.black_at(x - 0.5, y - 0.5) && m.black_at(x + 0.5, y + 0.5));
+                // Kalibr's squares touch the tags' corners; beside the edges is white.
+                let diagonal = squares.corner_squares_mm().is_some();
+                assert!(m.black_at(x - 0.5, y - 0.5) == diagonal && m.black_at(x + 0.5, y + 0.5));
+                assert!(!m.black_at(x - 0.5, y + 3.5) && !m.black_at(x + 3.5, y - 0.5));
             }
         }
+    }
+
+    /// The AprilTag project's codes of the first tags, the first cell in the highest bit, 1 for white.
+    #[test]
+    fn kalibrs_tags_are_those_of_the_apriltag_project() {
+        let grid = BoardSpec::MarkerGrid {
+            markers: [2, 2],
+            marker_mm: 10.0,
+            gap_mm: 3.0,
+            dictionary: "DICT_APRILTAG_36h11".into(),
+            first_id: 0,
+            border_mm: 0.0,
+            layout: MarkerLayout::Kalibr,
+            ring_cells: None,
+        };
+        let m = Markers::of(&grid).unwrap().unwrap();
+        assert_eq!((m.cells(), grid.outline()), (10, [-3.0, -3.0, 26.0, 26.0]));
+        for (id, code) in [0xd_5d62_8584u64, 0xd_97f1_8b49, 0xd_d280_910e].into_iter().enumerate() {
+            for k in 0..36 {
+                assert_eq!(m.black(id, 2 + k % 6, 2 + k / 6), code >> (35 - k) & 1 == 0, "tag {id}, cell {k}");
+            }
+        }
+        // Ids begin at the lower left and go right, then up.
+        assert_eq!(m.places().collect::<Vec<_>>(), [(0, 0, 2), (1, 0, 3), (0, 1, 0), (1, 1, 1)]);
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! The content of a YAML file as keys, lists and scalars.
+//! In: the text of a YAML file. Out: its content as keys, lists and scalars.
+//! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
 use saphyr_parser::{Event, Parser, ScalarStyle};
