@@ -248,9 +248,10 @@ fn cameras_are_calibrated_with_each_target() {
     for (kind, _) in KINDS {
         let dir = tempfile::tempdir().unwrap();
         let mut board = board(kind);
-        // ROS-Industrial's description leaves the dots' size open; what is simulated needs one.
-        if let BoardSpec::Circles { diameter_mm: open @ None, .. } = &mut board {
-            *open = Some(10.0);
+        if let BoardSpec::Circles { diameter_mm, border_mm, .. } = &mut board {
+            // ROS-Industrial's description leaves the dots' size open; what is simulated needs one, and a margin.
+            diameter_mm.get_or_insert(10.0);
+            *border_mm = 12.0;
         }
         let options =
             SimulateOptions { sets: vec![Set::Intrinsics], board: Some(board), seed: 5, ..SimulateOptions::default() };

@@ -110,7 +110,7 @@ fn partly(
     // The reading with the most dots, then the first seed: of a hidden grid, not every seed reaches all of it.
     let (mut best, mut refused): (Chosen, _) = (Vec::new(), None);
     for seed in seeds(blobs) {
-        match read(&grow(blobs, seed)) {
+        match read(&grow(blobs, seed, 2 * (nx * ny) as usize)) {
             Some(Ok(read)) if read.len() > best.len() => best = read,
             Some(Err(fault)) => {
                 refused.get_or_insert(fault);

@@ -21,7 +21,7 @@ pub type Lattice = HashMap<Node, usize>;
 
 /// Blobs in the order of the nodes, once for each rotation that fits.
 pub fn labelled(blobs: &[Blob], nodes: &[Node]) -> Option<Vec<Vec<usize>>> {
-    seeds(blobs).find_map(|seed| matching(&grow(blobs, seed), nodes, blobs))
+    seeds(blobs).find_map(|seed| matching(&grow(blobs, seed, nodes.len()), nodes, blobs))
 }
 
 /// The blobs from which lattices are grown: those closest to the middle, because at the rim the first steps may be
@@ -34,8 +34,9 @@ pub fn seeds(blobs: &[Blob]) -> impl Iterator<Item = usize> + use<> {
     seeds.into_iter().take(30)
 }
 
-/// Blobs reached from a seed by steps between neighbours: lattice coordinate to blob.
-pub fn grow(blobs: &[Blob], seed: usize) -> Lattice {
+/// Blobs reached from a seed by steps between neighbours: lattice coordinate to blob. It ends with more than `most` of
+/// them: grain of a background has thousands.
+pub fn grow(blobs: &[Blob], seed: usize, most: usize) -> Lattice {
     let nearest = |p: &Vec2, without: usize| {
         let others = blobs.iter().enumerate().filter(|(i, _)| *i != without);
         others.map(|(i, b)| (i, (b.centre - p).norm())).min_by(|a, b| a.1.total_cmp(&b.1))
@@ -52,6 +53,9 @@ pub fn grow(blobs: &[Blob], seed: usize) -> Lattice {
     let mut map = HashMap::from([((0, 0), seed)]);
     let mut queue = VecDeque::from([((0, 0), u, v)]);
     while let Some(((i, j), u, v)) = queue.pop_front() {
+        if map.len() > most {
+            break;
+        }
         let here = blobs[map[&(i, j)]].centre;
         for (di, dj) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
             let node = (i + di, j + dj);

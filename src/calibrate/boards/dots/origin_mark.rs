@@ -71,15 +71,24 @@ fn larger(lattice: &Lattice, blobs: &[Blob]) -> Option<Node> {
 /// Removes dots that something covers in part, worst first: those that lie off the place that their neighbours on the
 /// board predict. A lens moves neighbours alike.
 pub fn drop_covered(points: &mut Vec<BoardPoint>, features: &[Vec2]) {
+    // A removed dot changes the prediction of its neighbours only.
+    let mut off: Vec<f64> = (0..points.len()).map(|i| off_px(points, features, i)).collect();
     while points.len() > 2 * NEAR {
-        let off: Vec<f64> = (0..points.len()).map(|i| off_px(points, features, i)).collect();
         let mut sorted = off.clone();
         sorted.sort_by(f64::total_cmp);
         let limit = STANDS_OUT * sorted[sorted.len() / 2].max(LEAST_OFF_PX);
-        match (0..off.len()).filter(|i| off[*i] > limit).max_by(|a, b| off[*a].total_cmp(&off[*b])) {
-            Some(i) => points.remove(i),
-            None => return,
+        let Some(worst) = (0..off.len()).filter(|i| off[*i] > limit).max_by(|a, b| off[*a].total_cmp(&off[*b])) else {
+            return;
         };
+        let gone = features[points[worst].feature_id];
+        points.remove(worst);
+        off.remove(worst);
+        let mut near: Vec<usize> = (0..points.len()).collect();
+        near.sort_by(|a, b| {
+            let far = |i: &usize| (features[points[*i].feature_id] - gone).norm();
+            far(a).total_cmp(&far(b))
+        });
+        near.into_iter().take(4 * NEAR).for_each(|i| off[i] = off_px(points, features, i));
     }
 }
 
@@ -89,11 +98,15 @@ const NEAR: usize = 6;
 const STANDS_OUT: f64 = 4.0;
 const LEAST_OFF_PX: f64 = 0.05;
 
+/// Distance of a dot from the place that its nearest neighbours predict, px.
 fn off_px(points: &[BoardPoint], features: &[Vec2], i: usize) -> f64 {
     let at = |p: &BoardPoint| features[p.feature_id];
+    let far = |p: &BoardPoint| (at(p) - at(&points[i])).norm_squared();
     let mut others: Vec<&BoardPoint> = points.iter().filter(|p| p.feature_id != points[i].feature_id).collect();
-    others.sort_by(|a, b| (at(a) - at(&points[i])).norm().total_cmp(&(at(b) - at(&points[i])).norm()));
-    others.truncate(NEAR);
+    if others.len() > NEAR {
+        others.select_nth_unstable_by(NEAR - 1, |a, b| far(a).total_cmp(&far(b)).then(a.feature_id.cmp(&b.feature_id)));
+        others.truncate(NEAR);
+    }
     let (from, to): (Vec<Vec2>, Vec<Vec2>) = others.iter().map(|p| (at(p), p.pixel)).unzip();
     homography(&from, &to).map_or(0.0, |h| (apply(&h, &at(&points[i])) - points[i].pixel).norm())
 }
