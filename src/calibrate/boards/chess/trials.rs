@@ -143,7 +143,14 @@ fn begins(squares: [u32; 2], colour: Option<&str>, first_id: u32) -> BoardSpec {
 }
 
 fn circles(nx: u32, ny: u32, asymmetric: bool) -> BoardSpec {
-    BoardSpec::Circles { dots: [nx, ny], pitch_mm: 10.0, diameter_mm: Some(8.0), asymmetric, border_mm: 10.0 }
+    BoardSpec::Circles {
+        dots: [nx, ny],
+        pitch_mm: 10.0,
+        diameter_mm: Some(8.0),
+        asymmetric,
+        origin: None,
+        border_mm: 10.0,
+    }
 }
 
 #[test]
@@ -210,6 +217,8 @@ fn markers(count: [u32; 2], dictionary: &str, first_id: u32) -> BoardSpec {
         dictionary: dictionary.into(),
         first_id,
         border_mm: 6.0,
+        layout: Default::default(),
+        ring_cells: None,
     }
 }
 
@@ -305,6 +314,7 @@ fn dots_of_unstated_diameter_are_measured() {
         pitch_mm: 30.0,
         diameter_mm,
         asymmetric: false,
+        origin: None,
         border_mm: 9.0,
     };
     for (diameter, rotation) in [(22.0, Vec3::new(0.0, 0.6, 0.1)), (12.0, Vec3::new(-0.5, 0.2, 1.0))] {
@@ -331,8 +341,14 @@ fn boards_that_look_alike_when_turned_say_so() {
 #[test]
 fn a_circles_centre_is_not_the_centre_of_its_ellipse() {
     // Large dots close to a tilted camera: without correction, the centres would be off by 0.1 px and more.
-    let board =
-        BoardSpec::Circles { dots: [4, 3], pitch_mm: 30.0, diameter_mm: Some(22.0), asymmetric: false, border_mm: 9.0 };
+    let board = BoardSpec::Circles {
+        dots: [4, 3],
+        pitch_mm: 30.0,
+        diameter_mm: Some(22.0),
+        asymmetric: false,
+        origin: None,
+        border_mm: 9.0,
+    };
     let pose = facing(&board, Vec3::new(0.0, 0.6, 0.1), 190.0);
     let view = find(&picture(&board, &pose), &board, &FindOptions::default()).unwrap();
     let off = worst(&board, &pose, &view);

@@ -117,8 +117,8 @@ fn partly(
             }
             _ => {}
         }
-        // Of a whole grid a few dots may be part of finder patterns.
-        if 10 * best.len() >= 9 * (nx * ny) as usize {
+        // No other seed finds much more. A few dots may be part of finder patterns.
+        if 10 * best.len() >= 9 * blobs.len().min((nx * ny) as usize) {
             break;
         }
     }
