@@ -5,7 +5,7 @@
 
 use super::super::mark::OriginMark;
 use super::super::spec::BoardSpec;
-use super::{lacks, mm};
+use super::values::{lacks, mm};
 use crate::fault::{Fault, Result};
 use std::collections::HashMap;
 

@@ -3,7 +3,7 @@
 //! ours is the upper left one and z points into it.
 
 use super::super::spec::{BoardSpec, MarkerLayout};
-use super::{count, mm, number};
+use super::values::{count, mm, number};
 use crate::fault::{Fault, Result};
 use serde_json::{Map, Value};
 

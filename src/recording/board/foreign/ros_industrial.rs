@@ -4,7 +4,7 @@
 
 use super::super::mark::OriginMark;
 use super::super::spec::BoardSpec;
-use super::{count, mm, number};
+use super::values::{count, mm, number};
 use crate::fault::{Fault, Result};
 use serde_json::{Map, Value};
 
