@@ -66,7 +66,7 @@ fn board(keys: &HashMap<char, Vec<f64>>, marks: &[[f64; 3]], finders: Vec<[u32; 
         let at = [x0 + i as f64 * pitch - (j % 2) as f64 * shift, y0 + j as f64 * rows_apart];
         (m[0] - at[0]).abs().max((m[1] - at[1]).abs()).max((m[2] - radius).abs())
     };
-    if !(pitch > 0.0) || marks.iter().enumerate().any(|(k, m)| off(k, m) > OFF_GRID * pitch) {
+    if pitch <= 0.0 || marks.iter().enumerate().any(|(k, m)| off(k, m) > OFF_GRID * pitch) {
         let grid = if hexagonal { "hexagonal grid whose second row begins to the left" } else { "square grid" };
         return Err(Fault::input(format!("the marks do not lie on a {grid}, row by row, all of one size"))
             .cause("a plate of another kind, or an edited file")
