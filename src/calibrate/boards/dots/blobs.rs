@@ -7,7 +7,8 @@ use super::lattice::Blob;
 use crate::geometry::Vec2;
 use nalgebra::Matrix2;
 
-/// Elliptic patches darker (or brighter) than their surroundings; with `holes` also those with a round hole in the middle.
+/// Elliptic patches darker (or brighter) than their surroundings; with `holes` also those with a round hole in the
+/// middle.
 pub fn blobs(grey: &Grey, dark: bool, holes: bool) -> Vec<Blob> {
     let (w, h) = (grey.width, grey.height);
     let mask = mask(grey, dark, DARK);

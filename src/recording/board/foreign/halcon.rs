@@ -125,7 +125,7 @@ mod tests {
     /// A description as HALCON writes it, of 7 x `rows` marks.
     fn text(rows: usize, triangle: &str) -> String {
         let mut text = format!(
-            "# Plate Description Version 2\n# HALCON Version 12.0\n\n# Number of marks in y-dimension (rows)\nr {rows}\n\
+            "# Plate Description Version 2\n# HALCON Version 12.0\n\n# Number of marks (rows)\nr {rows}\n\
              \nc 7\n\nz 0\no -0.05125 0.05125 0.05125 -0.05125\ni -0.05 0.05 0.05 -0.05 \n{triangle}\n\nw 0.003125\n"
         );
         for k in 0..7 * rows {
