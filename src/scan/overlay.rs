@@ -18,7 +18,7 @@ pub fn colour(fate: Reject) -> Rgb {
         Reject::Echo => [255, 0, 0],
         Reject::Unsupported => [255, 0, 200],
         Reject::NoPoint => [255, 255, 255],
-        Reject::Beyond => [150, 170, 0],
+        Reject::Mixed => [150, 170, 0],
     }
 }
 

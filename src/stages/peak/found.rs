@@ -24,8 +24,8 @@ pub enum Reject {
     Unsupported = 8,
     /// The ray does not meet the laser plane in front of the camera, or the lens model has no ray there.
     NoPoint = 9,
-    /// Beyond the end of the surface: at a line's end, with less than half of the light inside or too wide.
-    Beyond = 10,
+    /// Light of two surfaces: at a line's end, and too wide or in a glow.
+    Mixed = 10,
 }
 
 impl Reject {
@@ -41,7 +41,7 @@ impl Reject {
         Reject::Echo,
         Reject::Unsupported,
         Reject::NoPoint,
-        Reject::Beyond,
+        Reject::Mixed,
     ];
     /// Name for reports and legends.
     pub fn words(self) -> &'static str {
@@ -56,7 +56,7 @@ impl Reject {
             Reject::Echo => "echo",
             Reject::Unsupported => "unsupported",
             Reject::NoPoint => "no point",
-            Reject::Beyond => "beyond an edge",
+            Reject::Mixed => "mixed",
         }
     }
 }

@@ -26,13 +26,15 @@ pub struct SupportParams {
     pub haze: f32,
     /// Support that a peak in such a glow needs, 0..=1.
     pub hazy: f32,
-    /// Smallest and largest width of a clean peak, over the stripe's width. A wider peak at a line's end is rejected.
+    /// Smallest and largest width of a clean peak, over the stripe's width.
     pub right_width: [f32; 2],
     /// Largest standard deviation of a clean peak's centre over the stripe's sigma, 0.01..=2; other peaks are doubtful.
     pub sure: f32,
-    /// Light that a point at the end of a line needs, 0..=1, over the light of the points inside. At 0.5 the surface
-    /// ends. With 0 the ends of lines are not judged, nor are points alone on their line.
-    pub end: f32,
+    /// Largest width of a peak at a line's end, 1..=3, over the stripe's width and over the shot's usual one.
+    pub end_width: f32,
+    /// Share of the amplitude, 0..=10, by which the level beside a peak at a line's end may exceed the shot's usual
+    /// level.
+    pub end_haze: f32,
 }
 
 impl Default for SupportParams {
@@ -47,7 +49,8 @@ impl Default for SupportParams {
             hazy: 0.7,
             right_width: [0.88, 1.22],
             sure: 0.43,
-            end: 0.5,
+            end_width: 1.35,
+            end_haze: 0.03,
         }
     }
 }
@@ -63,7 +66,8 @@ impl SupportParams {
             ("haze", self.haze, 0.0, 10.0),
             ("hazy", self.hazy, 0.0, 1.0),
             ("sure", self.sure, 0.01, 2.0),
-            ("end", self.end, 0.0, 1.0),
+            ("end_width", self.end_width, 1.0, 3.0),
+            ("end_haze", self.end_haze, 0.0, 10.0),
             ("right_width[0]", self.right_width[0], 0.0, 1.0),
             ("right_width[1]", self.right_width[1], 1.0, 3.0),
         ] {
