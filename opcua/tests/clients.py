@@ -1,4 +1,5 @@
-"""In: addresses. Out: the program sheetlight-opcua as a process, and a client of it by asyncua, which shares no code with it.
+"""In: addresses. Out: the program sheetlight-opcua as a process, and a client of it by asyncua, which shares no code
+with it.
 Frame and unit: s."""
 
 import asyncio
@@ -17,7 +18,19 @@ from waits import PATIENCE
 logging.getLogger("asyncua").setLevel(logging.CRITICAL)
 OWN, VISION = "urn:sheetlight:vision", "http://opcfoundation.org/UA/MachineVision"
 # The parts of a result's content, by their names as variables.
-CONTENT = ["Found", "Pose", "Approach", "Retract", "SigmaMm", "SigmaDeg", "GatesJudged", "GatesPassed", "Score", "Error", "ErrorWords"]
+CONTENT = [
+    "Found",
+    "Pose",
+    "Approach",
+    "Retract",
+    "SigmaMm",
+    "SigmaDeg",
+    "GatesJudged",
+    "GatesPassed",
+    "Score",
+    "Error",
+    "ErrorWords",
+]
 INNER = "VisionStateMachine.AutomaticModeStateMachine"
 
 
@@ -70,8 +83,35 @@ def hello(url):
 def certificate(folder):
     """A client's certificate with its key, as openssl makes them."""
     key, pem, der = (os.path.join(folder, f"client{e}") for e in ("-key.pem", ".pem", ".der"))
-    more = ["-addext", "subjectAltName=URI:urn:client:test,DNS:localhost", "-addext", "keyUsage=digitalSignature,nonRepudiation,keyEncipherment,dataEncipherment", "-addext", "extendedKeyUsage=clientAuth"]
-    subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "30", "-subj", "/CN=client", "-keyout", key, "-out", pem, *more], check=True, capture_output=True)
+    more = [
+        "-addext",
+        "subjectAltName=URI:urn:client:test,DNS:localhost",
+        "-addext",
+        "keyUsage=digitalSignature,nonRepudiation,keyEncipherment,dataEncipherment",
+        "-addext",
+        "extendedKeyUsage=clientAuth",
+    ]
+    subprocess.run(
+        [
+            "openssl",
+            "req",
+            "-x509",
+            "-newkey",
+            "rsa:2048",
+            "-nodes",
+            "-days",
+            "30",
+            "-subj",
+            "/CN=client",
+            "-keyout",
+            key,
+            "-out",
+            pem,
+            *more,
+        ],
+        check=True,
+        capture_output=True,
+    )
     subprocess.run(["openssl", "x509", "-in", pem, "-outform", "der", "-out", der], check=True, capture_output=True)
     return der, key
 
@@ -80,7 +120,12 @@ class Gateway:
     """`sheetlight-opcua` on any free port."""
 
     def __init__(self, program, station, *more):
-        self.process = subprocess.Popen([program, "--station", station, "--listen", "opc.tcp://127.0.0.1:0", *more], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen(
+            [program, "--station", station, "--listen", "opc.tcp://127.0.0.1:0", *more],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         # A test that fails leaves no server behind.
         atexit.register(self.process.kill)
         self.lines = []
@@ -268,7 +313,21 @@ class Client:
 
         number = lambda n: ua.Variant(n, ua.VariantType.UInt32)
         named = ua.PartIdDataType(Id=part) if part else None
-        return await self.call("ResultManagement.GetResultListFiltered", state, None, named, None, None, None, None, None, None, number(most), number(start), 0)
+        return await self.call(
+            "ResultManagement.GetResultListFiltered",
+            state,
+            None,
+            named,
+            None,
+            None,
+            None,
+            None,
+            None,
+            None,
+            number(most),
+            number(start),
+            0,
+        )
 
     def forget(self):
         """What is told from now on."""
@@ -286,7 +345,13 @@ class Client:
             self.node("Station.Phase").nodeid: "phase",
         }
         kinds = {}
-        for name, number in (("JobStartedEventType", 1013), ("StateChangedEventType", 1018), ("RecipePreparedEventType", 1022), ("ReadyEventType", 1023), ("ResultReadyEventType", 1024)):
+        for name, number in (
+            ("JobStartedEventType", 1013),
+            ("StateChangedEventType", 1018),
+            ("RecipePreparedEventType", 1022),
+            ("ReadyEventType", 1023),
+            ("ResultReadyEventType", 1024),
+        ):
             kinds[ua.NodeId(number, self.vision)] = name
 
         class Handler:
@@ -294,7 +359,9 @@ class Client:
                 # The server begins an item of events with an empty value, too.
                 if node.nodeid not in names:
                     return
-                self.seen.values.append((names[node.nodeid], value.Text if isinstance(value, ua.LocalizedText) else value))
+                self.seen.values.append(
+                    (names[node.nodeid], value.Text if isinstance(value, ua.LocalizedText) else value)
+                )
 
             def event_notification(_, event):
                 self.seen.events.append((kinds.get(event.EventType, str(event.EventType)), event))
@@ -303,9 +370,13 @@ class Client:
                 self.seen.values.append(("status", status))
 
         self.subscription = await self.inner.create_subscription(50, Handler())
-        await self.subscription.subscribe_data_change([self.inner.get_node(n) for n in names], queuesize=20, sampling_interval=0)
+        await self.subscription.subscribe_data_change(
+            [self.inner.get_node(n) for n in names], queuesize=20, sampling_interval=0
+        )
         # Its filter of event types compares node identifiers, which the server does not.
-        await self.subscription.subscribe_events(self.system(), [self.inner.get_node(n) for n in kinds], queuesize=100, where_clause_generation=False)
+        await self.subscription.subscribe_events(
+            self.system(), [self.inner.get_node(n) for n in kinds], queuesize=100, where_clause_generation=False
+        )
 
     async def watch_results(self):
         """Subscribes to one type of event at the server object. Returns what it is told."""
@@ -314,7 +385,12 @@ class Client:
 
         told, kind = [], self.inner.get_node(ua.NodeId(1024, self.vision))
         where = await get_filter_from_event_type([kind], False)
-        where.WhereClause.Elements.append(ua.ContentFilterElement(FilterOperator=ua.FilterOperator.OfType, FilterOperands=[ua.LiteralOperand(Value=ua.Variant(kind.nodeid, ua.VariantType.NodeId))]))
+        where.WhereClause.Elements.append(
+            ua.ContentFilterElement(
+                FilterOperator=ua.FilterOperator.OfType,
+                FilterOperands=[ua.LiteralOperand(Value=ua.Variant(kind.nodeid, ua.VariantType.NodeId))],
+            )
+        )
 
         class Handler:
             def datachange_notification(_, node, value, data):

@@ -1,8 +1,8 @@
-"""In: the program sheetlight-opcua, the program sheetlight, an empty folder, names of parts, the cell's speed, the sweep's length,
-a number of random frames. Out: failure if an OPC UA client cannot start and follow insertions under the conditions of the
-screen, if it starts anything without them or moves anything itself, if states, events or results differ from what the screen's
-own interface and the cell's truth say, or if foreign bytes, many connections, strangers or a lost station do more than they may.
-The client is asyncua, which shares no code with the server.
+"""In: the program sheetlight-opcua, the program sheetlight, an empty folder, names of parts, the cell's speed, the
+sweep's length, a number of random frames. Out: failure if an OPC UA client cannot start and follow insertions under
+the conditions of the screen, if it starts anything without them or moves anything itself, if states, events or
+results differ from what the screen's own interface and the cell's truth say, or if foreign bytes, many connections,
+strangers or a lost station do more than they may. The client is asyncua, which shares no code with the server.
 Frame and unit: mm, degrees; s."""
 
 import asyncio
@@ -44,7 +44,9 @@ async def refuses(c, number, words, made):
     """A call is refused with its number; the words are there."""
     *_, error = await made
     assert error == number, (error, number, await c.shown("LastRefusalWords"))
-    assert await c.shown("LastRefusal") == number and words in await c.shown("LastRefusalWords"), await c.shown("LastRefusalWords")
+    assert await c.shown("LastRefusal") == number and words in await c.shown("LastRefusalWords"), await c.shown(
+        "LastRefusalWords"
+    )
 
 
 async def invalid(made):
@@ -65,7 +67,9 @@ def c_ua():
 
 def misused():
     """Wrong options end the start with a reason."""
-    run = lambda *words: subprocess.run([program, "--station", "127.0.0.1:9", *words], capture_output=True, text=True, timeout=60)
+    run = lambda *words: subprocess.run(
+        [program, "--station", "127.0.0.1:9", *words], capture_output=True, text=True, timeout=60
+    )
     done = run("--listen", "opc.tcp://0.0.0.0:0")
     assert done.returncode == 2 and "--pki or --login is missing" in done.stderr and "next step" in done.stderr, done
     with socket.create_server(("127.0.0.1", 0)) as taken:
@@ -73,7 +77,14 @@ def misused():
     assert done.returncode == 1 and "cannot be listened on" in done.stderr, done
     done = run("--listen", "127.0.0.1:4840")
     assert done.returncode == 2 and "wanted opc.tcp://HOST:PORT" in done.stderr, done
-    done = run("--login", os.path.join(folder, "none"), "--pki", os.path.join(folder, "none-pki"), "--listen", "opc.tcp://127.0.0.1:0")
+    done = run(
+        "--login",
+        os.path.join(folder, "none"),
+        "--pki",
+        os.path.join(folder, "none-pki"),
+        "--listen",
+        "opc.tcp://127.0.0.1:0",
+    )
     assert done.returncode == 1 and "two lines" not in done.stdout and "--login" in done.stderr, done
 
 
@@ -200,7 +211,9 @@ async def inserted(c, g, s, op, part, first):
         confirmed = await leaves()
     stored = s.json("GET", f"/jobs/{name}")
     assert stored["state"] == "done", stored
-    await settled(lambda: {"JobStartedEventType", "ResultReadyEventType", "ReadyEventType"} <= {n for n, _ in seen.events})
+    await settled(
+        lambda: {"JobStartedEventType", "ResultReadyEventType", "ReadyEventType"} <= {n for n, _ in seen.events}
+    )
     states = [v for n, v in seen.values if n == "automatic"]
     # The state before is told late where nothing else happened.
     assert states[-2:] == ["SingleExecution", "Ready"] and set(states[:-2]) <= {"Initialized", "Ready"}, states
@@ -209,7 +222,9 @@ async def inserted(c, g, s, op, part, first):
     phases = [v for n, v in seen.values if n == "phase" and v]
     assert phases[-4:] == ["approach", "insert", "retract", "inserted"], phases
     told = [n for n, _ in seen.events]
-    assert told.count("JobStartedEventType") == told.count("ResultReadyEventType") == told.count("ReadyEventType") == 1, told
+    assert (
+        told.count("JobStartedEventType") == told.count("ResultReadyEventType") == told.count("ReadyEventType") == 1
+    ), told
     transitions = [e.Message.Text for n, e in seen.events if n == "StateChangedEventType"]
     assert transitions == ["ReadyToSingleExecution", "SingleExecutionToReadyAuto"], transitions
     ready_event = next(e for n, e in seen.events if n == "ResultReadyEventType")
@@ -234,16 +249,21 @@ async def inserted(c, g, s, op, part, first):
     log = [e for e in await settled(lambda: [e for e in events(folder)[begun:] if e["what"] == "released"])]
     assert len(log) == 1 and log[0]["inserted"], log
     assert not any(e["what"] == "collision" for e in events(folder)[begun:])
-    print(f"{part}: inserted {log[0]['lateral_mm']:.3f} mm aside, {len(seen.values)} changes seen, questions {confirmed}")
+    print(
+        f"{part}: inserted {log[0]['lateral_mm']:.3f} mm aside, {len(seen.values)} changes seen, questions {confirmed}"
+    )
 
 
 def near(a, b):
     """Equal to the units of the registers; an angle may have gone round."""
-    return len(a) == 6 and all(abs(x - y) <= 0.00051 or k > 2 and abs(abs(x - y) - 360) < 0.001 for k, (x, y) in enumerate(zip(a, b)))
+    return len(a) == 6 and all(
+        abs(x - y) <= 0.00051 or k > 2 and abs(abs(x - y) - 360) < 0.001 for k, (x, y) in enumerate(zip(a, b))
+    )
 
 
 async def second(c, g):
-    """A second client sees the same and starts nothing while a job runs; when it goes, nothing changes. Returns what it sent."""
+    """A second client sees the same and starts nothing while a job runs; when it goes, nothing changes. Returns what it
+    sent."""
     async with Client(g.url, records=True) as other:
         assert await other.automatic() == "SingleExecution" and await other.shown("AwaitsConfirmation") == "touch"
         await refuses(other, -6, "a job runs", other.start("osc"))
@@ -299,6 +319,7 @@ def attack(g, recorded, s):
 
 async def ends(c, s, op):
     """A job that the client stops, one that it aborts, one that the person refuses, one that the screen starts."""
+
     async def begins():
         op.arm()
         await c.until_shown("RobotArmed", bool)
@@ -314,7 +335,9 @@ async def ends(c, s, op):
         await c.until_result(job)
         stored = s.json("GET", "/jobs")[0]
         assert (await c.result("ResultState"), await c.result("Error")) == (state, code)
-        assert await c.result("ErrorWords") == stored["problem"]["what"][:200] and len(await c.result("Pose")) == 0, stored
+        assert await c.result("ErrorWords") == stored["problem"]["what"][:200] and len(await c.result("Pose")) == 0, (
+            stored
+        )
 
     before = moves()
     job, _ = await begins()
@@ -338,7 +361,9 @@ async def ends(c, s, op):
     # Halt stops it, and Reset leads back.
     assert await c.call("VisionStateMachine.Halt", 1, "end of the shift") == 0
     await c.until_state("Halted")
-    stored = await settled(lambda: (lambda j: j if j["state"] not in ("queued", "running") else None)(s.json("GET", "/jobs")[0]))
+    stored = await settled(
+        lambda: (lambda j: j if j["state"] not in ("queued", "running") else None)(s.json("GET", "/jobs")[0])
+    )
     assert stored["state"] == "stopped", stored
     await c.until_result(str(int(stored["id"].split("-")[0])))
     assert await c.result("Recipe") == "" and await c.result("ResultState") == 3
@@ -352,8 +377,15 @@ async def ends(c, s, op):
     assert (complete, count) == (False, 2)
     _, count, _, listed, _ = await c.results(state=1, part=f"board-7/{PARTS[0]}")
     assert count == 1 and listed[0].ExternalRecipeId.Id == PARTS[0], listed
-    apart = await c.call("ResultManagement.GetResultComponentsById", c_ua().ResultIdDataType(Id=listed[0].ResultId.Id), 0)
-    assert apart[4] == 1 and apart[6].Id == f"board-7/{PARTS[0]}" and len(apart[15]) == len(clients.CONTENT) and apart[-1] == 0, apart
+    apart = await c.call(
+        "ResultManagement.GetResultComponentsById", c_ua().ResultIdDataType(Id=listed[0].ResultId.Id), 0
+    )
+    assert (
+        apart[4] == 1
+        and apart[6].Id == f"board-7/{PARTS[0]}"
+        and len(apart[15]) == len(clients.CONTENT)
+        and apart[-1] == 0
+    ), apart
 
 
 async def lost(c, s, op):
@@ -421,10 +453,43 @@ async def strangers(s):
 async def guided():
     """A station whose robot the client moves: shots and errors pass through."""
     port = clients.free_port()
-    out = subprocess.run([sheetlight, "--quiet", "simulate", "--out", os.path.join(folder, "guided"), "--set", "surface", "--width", "320"], capture_output=True, text=True)
+    out = subprocess.run(
+        [
+            sheetlight,
+            "--quiet",
+            "simulate",
+            "--out",
+            os.path.join(folder, "guided"),
+            "--set",
+            "surface",
+            "--width",
+            "320",
+        ],
+        capture_output=True,
+        text=True,
+    )
     assert out.returncode == 0, out
     station = os.path.join(folder, "guided", "station")
-    words = ["robot", "serve", "--protocol", "modbus", "--station", station, "--camera", "sim:3?still=0.5&size=320x240", "--recipes", os.path.join(folder, "recipes"), "--out", os.path.join(folder, "scans"), "--listen", f"127.0.0.1:{port}", "--notation", "denso", "--on", "cpu"]
+    words = [
+        "robot",
+        "serve",
+        "--protocol",
+        "modbus",
+        "--station",
+        station,
+        "--camera",
+        "sim:3?still=0.5&size=320x240",
+        "--recipes",
+        os.path.join(folder, "recipes"),
+        "--out",
+        os.path.join(folder, "scans"),
+        "--listen",
+        f"127.0.0.1:{port}",
+        "--notation",
+        "denso",
+        "--on",
+        "cpu",
+    ]
     served = subprocess.Popen([sheetlight, *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     g = Gateway(program, f"127.0.0.1:{port}")
     try:
@@ -437,13 +502,19 @@ async def guided():
             job, error = await c.start("osc", part="p-1")
             assert (job.Id, error) == ("scan-1", 0), (job, error)
             for k in range(3):
-                shots, error = await c.call("Station.AddPose", clients.doubles([300.0, 0.5 * k, 400.0, 180.0, 0, 180.0]))
+                shots, error = await c.call(
+                    "Station.AddPose", clients.doubles([300.0, 0.5 * k, 400.0, 180.0, 0, 180.0])
+                )
                 assert (shots, error) == (k + 1, 0), (shots, error, await c.shown("LastRefusalWords"))
             shots, error = await c.call("Station.AddPose", clients.doubles([0.3, 0, 0.4, 180.0, 0, 180.0]))
             assert (shots, error) == (3, -2), (shots, error)
             assert await c.call("Station.FindPart") == -4
             await c.until_state("Operational", "Ready")
-            assert (await c.result("ResultId"), await c.result("ResultState"), await c.result("Error")) == ("scan-1", 4, 4)
+            assert (await c.result("ResultId"), await c.result("ResultState"), await c.result("Error")) == (
+                "scan-1",
+                4,
+                4,
+            )
             assert await c.result("PartId") == "p-1" and len(await c.result("Pose")) == 0
             # Stop ends a scan here; the station has none.
             assert (await c.start("osc"))[1] == 0
@@ -456,7 +527,9 @@ async def guided():
 
 
 async def cell():
-    s = await asyncio.to_thread(Server, sheetlight, folder, "--simulate", "--set", "none", "--speed", speed, "--modbus", "0")
+    s = await asyncio.to_thread(
+        Server, sheetlight, folder, "--simulate", "--set", "none", "--speed", speed, "--modbus", "0"
+    )
     op = Operator(s)
     g = Gateway(program, door(s), *(w for p in PARTS for w in ("--recipe", p)))
     async with Client(g.url) as c:
