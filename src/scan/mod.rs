@@ -6,7 +6,6 @@ mod ambient;
 mod captured;
 mod carrier;
 mod cloud;
-mod ends;
 mod engine;
 mod extraction;
 mod foreign;

@@ -3,7 +3,6 @@
 //! Frame and unit: points in the carrier's frame (mostly the robot's base), mm (docs/math.md, Stripe peak; the
 //! paper's eq. 5 and 6).
 
-use super::ends;
 use super::engine::{Engine, Measured, Optical, StripeSeen};
 use super::{Along, Ambient, Carrier, CloudPoint, Extraction, Pictures, Place, Processor, Shot};
 use crate::camera::Intrinsics;
@@ -298,7 +297,7 @@ impl Scanner {
         };
         let (across, width) = (self.optics.across(), self.width_px());
         let settings = &self.extraction.support;
-        judged.par_iter_mut().for_each(|p| ends::mark(&mut p.peaks, across, width, settings));
+        judged.par_iter_mut().for_each(|p| support::ends::mark(&mut p.peaks, across, width, settings));
         let mut done = std::mem::take(&mut self.early);
         done.extend(judged.into_iter().map(|p| self.profile(p)));
         Ok(done)

@@ -9,6 +9,7 @@ use super::support::params::SupportParams;
 use crate::fault::Result;
 use crate::geometry::Vec3;
 use crate::gpu::Device;
+pub mod ends;
 mod gpu;
 pub mod params;
 pub(in crate::stages) mod stage;

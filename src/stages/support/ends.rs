@@ -4,8 +4,8 @@
 //! Where a surface ends and another one begins, lens and fit mix the light of both. The last peaks of a line are too
 //! wide there, or lie in the glow of the other surface, and their centres lie between the two.
 
+use super::params::SupportParams;
 use crate::stages::peak::found::{Peak, Reject};
-use crate::stages::support::params::SupportParams;
 use glam::Vec2;
 
 /// Distance over which a fit mixes light, in the stripe's sigmas. Points of a line are neighbours up to it, and none
@@ -24,7 +24,7 @@ struct Site {
 }
 
 /// Marks peaks; `across` is the unit vector across the stripe, `width_px` the stripe's Gaussian sigma.
-pub(super) fn mark(peaks: &mut [Peak], across: Vec2, width_px: f32, settings: &SupportParams) {
+pub fn mark(peaks: &mut [Peak], across: Vec2, width_px: f32, settings: &SupportParams) {
     if !settings.on {
         return;
     }
