@@ -48,7 +48,7 @@ def cloud(path):
     end = data.index(b"end_header\n") + len(b"end_header\n")
     lines = data[:end].decode().split("\n")
     count = int(next(l for l in lines if l.startswith("element vertex")).split()[2])
-    kinds = {"float": "<f4", "uint": "<u4"}
+    kinds = {"float": "<f4", "int": "<i4"}
     fields = [(l.split()[2], kinds[l.split()[1]]) for l in lines if l.startswith("property")]
     return np.frombuffer(data, np.dtype(fields), count, end)
 
