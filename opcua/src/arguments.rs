@@ -49,7 +49,7 @@ pub fn words(arguments: &[Variant], at: usize) -> Result<Vec<String>, StatusCode
     values.into_iter().map(word).collect()
 }
 
-/// What a job is told to do beside its recipe: "insert", "find", "sweep_mm=30".
+/// Options of a job: the texts "insert", "find" and "sweep_mm=30".
 pub fn request(recipe: &str, parameters: &[String]) -> Result<Ask, StatusCode> {
     let (mut find, mut sweep_mm) = (false, None);
     for word in parameters {
