@@ -12,6 +12,7 @@ use sheetlight::scan::{CloudPoint, read_cloud, write_cloud};
 use sheetlight::station::load_report;
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::process::Command;
 
 const SETS: [&str; 8] = ["flat", "steps", "shiny", "scan_dimm", "scan_led", "scan_osc", "scan_flash", "scan_led_hires"];
 
@@ -62,6 +63,32 @@ fn bars() -> Vec<(Vec<&'static str>, f64, f64)> {
 /// Figures of noise and completeness: where a camera is turned they are held against those of the unturned one.
 fn sizes(path: &[&str]) -> bool {
     ["rms", "completeness"].iter().any(|word| path[2].contains(word))
+}
+
+/// Share of a cloud's points beyond three of their standard deviations, at most; of Gaussian errors it would be 0.003.
+const BEYOND: f64 = 0.01;
+/// Share of the points within one, at least and at most. Of Gaussian errors it would be 0.68; most points lie where the
+/// brightness does not change across the sheet as it might.
+const WITHIN: [f64; 2] = [0.68, 0.88];
+
+/// One line per cloud whose stated standard deviations are not those of its points.
+fn dishonest(reference: &Path, cloud: &Path, mesh: &Path) -> Vec<String> {
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/honest.py");
+    let run = Command::new("python3").arg(script).arg(reference.join("rendered")).args([cloud, mesh]).output();
+    let done = run.expect("the scorer runs, so Python is there");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let text = String::from_utf8(done.stdout).unwrap();
+    let shares: Vec<f64> = text.lines().map(|line| line.parse().unwrap()).collect();
+    let [within, beyond] = shares[..] else { panic!("{text}") };
+    println!("{}: {within:.3} within one sigma, {beyond:.4} beyond three", cloud.display());
+    let mut faults = Vec::new();
+    if beyond > BEYOND {
+        faults.push(format!("{}: {beyond:.4} beyond three sigma, allowed {BEYOND}", cloud.display()));
+    }
+    if !(WITHIN[0]..=WITHIN[1]).contains(&within) {
+        faults.push(format!("{}: {within:.3} within one sigma, allowed {WITHIN:?}", cloud.display()));
+    }
+    faults
 }
 
 /// One line per figure that is worse than its bar.
@@ -123,7 +150,11 @@ fn scans_with_the_true_calibration_meet_their_bars() {
         let estimate = dir.path().join("estimate.json");
         std::fs::write(&estimate, serde_json::json!({ "sets": sets }).to_string()).unwrap();
         let Some(score) = score(&reference, &estimate, &truth) else { return };
-        let faults = worse(&score, false);
+        let mut faults = worse(&score, false);
+        for set in SETS {
+            let [cloud, mesh] = [dir.path().join(set).join("cloud.ply"), truth.join(set).join("mesh.ply")];
+            faults.extend(dishonest(&reference, &cloud, &mesh));
+        }
         assert!(faults.is_empty(), "{}:\n{}", inputs.display(), faults.join("\n"));
     }
 }
@@ -170,6 +201,8 @@ fn scans_under_a_slanted_stripe_meet_their_bars() {
     std::fs::write(&estimate, serde_json::json!({ "sets": sets }).to_string()).unwrap();
     let Some(score) = score(&reference, &estimate, &truth) else { return };
     for (set, rms, median, outliers, complete, _) in SLANTED_BARS {
+        let [cloud, mesh] = [dir.path().join(set).join("cloud.ply"), truth.join(set).join("mesh.ply")];
+        faults.extend(dishonest(&reference, &cloud, &mesh));
         for (name, least, most) in [
             ("rms_mm_without_outliers", 0.0, rms),
             ("median_mm", 0.0, median),

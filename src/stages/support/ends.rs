@@ -4,52 +4,32 @@
 //! Where a surface ends and another one begins, lens and fit mix the light of both. The last peaks of a line are too
 //! wide there, or lie in the glow of the other surface, and their centres lie between the two.
 
+use super::line::{Line, near_px};
 use super::params::SupportParams;
 use crate::stages::peak::found::{Peak, Reject};
 use glam::Vec2;
-
-/// Distance over which a fit mixes light, in the stripe's sigmas. Points of a line are neighbours up to it, and none
-/// farther from a line's end is rejected.
-const NEAR: f32 = 3.5;
-/// Least such distance, px: thinning leaves gaps of a pixel.
-const NEAR_PX: f32 = 2.5;
-
-/// A kept peak.
-#[derive(Clone, Copy)]
-struct Site {
-    /// Position along the stripe and across it, px.
-    at: Vec2,
-    /// Its index.
-    peak: usize,
-}
 
 /// Marks peaks; `across` is the unit vector across the stripe, `width_px` the stripe's Gaussian sigma.
 pub fn mark(peaks: &mut [Peak], across: Vec2, width_px: f32, settings: &SupportParams) {
     if !settings.on {
         return;
     }
-    let along = across.perp();
-    let site = |(peak, k): (usize, &Peak)| {
-        let at = Vec2::new(k.u, k.v);
-        Site { at: Vec2::new(at.dot(along), at.dot(across)), peak }
-    };
-    let mut sites: Vec<Site> = peaks.iter().enumerate().filter(|(_, k)| k.kept()).map(site).collect();
-    sites.sort_by(|a, b| a.at.x.total_cmp(&b.at.x));
-    let near = (NEAR * width_px).max(NEAR_PX);
+    let line = Line::new(peaks, across);
+    let near = near_px(width_px);
     // Out of focus all peaks are wide.
     let widest = settings.end_width * usual(peaks, |k| k.width_px).max(width_px);
     let level = usual(peaks, |k| k.background);
-    for i in 0..sites.len() {
-        let [before, after] = [-1, 1].map(|step| beside(&sites, i, step, near).next().is_some());
+    for i in 0..line.len() {
+        let [before, after] = [-1, 1].map(|step| line.beside(i, step, near).next().is_some());
         if !before && !after {
-            peaks[sites[i].peak].refuse(Reject::Unsupported);
+            peaks[line.peak(i)].refuse(Reject::Unsupported);
         }
         if before == after {
             continue;
         }
         let inwards = if after { 1 } else { -1 };
-        for j in std::iter::once(i).chain(beside(&sites, i, inwards, near)) {
-            let k = &mut peaks[sites[j].peak];
+        for j in std::iter::once(i).chain(line.beside(i, inwards, near)) {
+            let k = &mut peaks[line.peak(j)];
             if k.width_px <= widest && k.background - level <= settings.end_haze * k.amplitude {
                 break;
             }
@@ -66,14 +46,6 @@ fn usual(peaks: &[Peak], of: fn(&Peak) -> f32) -> f32 {
     }
     let middle = all.len() / 2;
     *all.select_nth_unstable_by(middle, f32::total_cmp).1
-}
-
-/// Neighbours of a site up to this distance, on the side where the order goes on by `step`.
-fn beside(sites: &[Site], i: usize, step: isize, near: f32) -> impl Iterator<Item = usize> + '_ {
-    let here = sites[i].at;
-    std::iter::successors(i.checked_add_signed(step), move |j| j.checked_add_signed(step))
-        .take_while(move |&j| sites.get(j).is_some_and(|s| (s.at.x - here.x).abs() <= near))
-        .filter(move |&j| sites[j].at.distance(here) <= near)
 }
 
 #[cfg(test)]

@@ -11,6 +11,8 @@ use crate::geometry::Vec3;
 use crate::gpu::Device;
 pub mod ends;
 mod gpu;
+pub mod gradient;
+mod line;
 pub mod params;
 pub(in crate::stages) mod stage;
 

@@ -1,0 +1,160 @@
+//! In: the peaks of one shot and their points. Out: the same; their standard deviations contain what the brightness of
+//! the surface may shift. Frame and unit: pixels of the shot, mm; docs/math.md, Stripe peak (7).
+//!
+//! The sheet is a bell of light. A surface that grows brighter across it moves the light's middle to its brighter side,
+//! by the sheet's variance times the slope of the light's logarithm [curless95]. One shot shows this slope along the
+//! stripe only. Print and edges have any direction, so across it is taken to be as large, of either sign.
+
+use super::line::{Line, near_px};
+use crate::stages::peak::found::Peak;
+use crate::stages::stripe::point::Point;
+use glam::Vec2;
+
+/// Variance of a picture's own blur, px²: the pixel's size and a good lens. The rest of a stripe's variance is the
+/// sheet's.
+const BLUR: f32 = 0.25;
+/// The slope is that over the stripe's sigma to both sides, and at least over this, px.
+const LEAST_PX: f32 = 1.5;
+
+/// Widens the standard deviations of kept peaks and of their points. `across` is the unit vector across the stripe,
+/// `width_px` the stripe's Gaussian sigma.
+pub fn widen(peaks: &mut [Peak], points: &mut [Point], across: Vec2, width_px: f32) {
+    let sheet = (width_px * width_px - BLUR).max(0.0);
+    let line = Line::new(peaks, across);
+    let slopes: Vec<f32> = (0..line.len()).map(|i| slope(peaks, &line, i, width_px)).collect();
+    for (i, slope) in slopes.into_iter().enumerate() {
+        let at = line.peak(i);
+        // Light that ends beside the sheet's middle moves it by the sheet's sigma at most.
+        let shift = sheet * slope.min(sheet.sqrt().recip());
+        if shift > 0.0 {
+            let stated = peaks[at].sigma_px;
+            peaks[at].sigma_px = stated.hypot(shift);
+            points[at].sigma_mm *= peaks[at].sigma_px / stated;
+        }
+    }
+}
+
+/// Size of the slope of the light's logarithm along the stripe at the `i`-th peak, 1/px, without what noise makes of
+/// an even surface; 0 where a neighbour's fit states no finite sigma. A straight line is fitted by least squares, with less weight for farther neighbours.
+fn slope(peaks: &[Peak], line: &Line, i: usize, width_px: f32) -> f32 {
+    let reach = width_px.max(LEAST_PX);
+    let sides = [-1, 1].into_iter().flat_map(|step| line.beside(i, step, near_px(width_px)));
+    let near = std::iter::once(i).chain(sides).filter(|&j| line.way(i, j).abs() <= reach);
+    // Weight, distance, logarithm of the light and its variance. A fit knows its amplitude about as well, relative to
+    // it, as its centre, relative to its width.
+    let entry = |j: usize| {
+        let k = &peaks[line.peak(j)];
+        let x = line.way(i, j);
+        let noise = k.sigma_px / k.width_px;
+        [(-2.0 * (x / reach).powi(2)).exp(), x, k.amplitude.max(f32::MIN_POSITIVE).ln(), noise * noise]
+    };
+    let near: Vec<[f32; 4]> = near.map(entry).collect();
+    let sum = |of: &dyn Fn(&[f32; 4]) -> f32| near.iter().map(of).sum::<f32>();
+    let all = sum(&|e| e[0]);
+    let [middle, light] = [1, 2].map(|n| sum(&|e| e[0] * e[n]) / all);
+    let spread = sum(&|[w, x, ..]| w * (x - middle).powi(2));
+    if spread <= f32::EPSILON {
+        return 0.0;
+    }
+    let slope = sum(&|[w, x, l, _]| w * (x - middle) * (l - light)) / spread;
+    let noise = sum(&|[w, x, _, v]| (w * (x - middle)).powi(2) * v) / (spread * spread);
+    (slope * slope - noise).max(0.0).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STRIPE: f32 = 2.0;
+    const SIGMA: f32 = 0.01;
+    const MM: f32 = 0.1;
+
+    /// Peaks a pixel apart along a direction with these amplitudes.
+    fn line(along: Vec2, amplitudes: &[f32]) -> (Vec<Peak>, Vec<Point>) {
+        let peak = |(i, &amplitude): (usize, &f32)| {
+            let at = Vec2::new(200.0, 300.0) + along * i as f32;
+            Peak { u: at.x, v: at.y, amplitude, width_px: STRIPE, sigma_px: SIGMA, ..Peak::default() }
+        };
+        let peaks: Vec<Peak> = amplitudes.iter().enumerate().map(peak).collect();
+        let points = vec![Point { position: glam::Vec3::ZERO, sigma_mm: SIGMA * MM }; peaks.len()];
+        (peaks, points)
+    }
+
+    /// Light that grows by 5 % a pixel: the sheet's variance is 4 px² less the blur.
+    #[test]
+    fn a_slope_of_the_light_widens_by_the_sheets_variance() {
+        for degrees in [0.0f32, 42.0, 90.0, 135.0] {
+            let along = Vec2::from_angle(degrees.to_radians());
+            let amplitudes: Vec<f32> = (0..30).map(|i| 50.0 * (0.05 * i as f32).exp()).collect();
+            let (mut peaks, mut points) = line(along, &amplitudes);
+            widen(&mut peaks, &mut points, along.perp(), STRIPE);
+            let want = SIGMA.hypot(3.75 * 0.05);
+            for (k, p) in peaks.iter().zip(&points).take(28).skip(2) {
+                assert!((k.sigma_px / want - 1.0).abs() < 0.01, "{degrees} degrees: {} for {want}", k.sigma_px);
+                assert!((p.sigma_mm / (want * MM) - 1.0).abs() < 0.01);
+            }
+        }
+    }
+
+    /// Amplitudes that differ as much as their noise says add little on average, and even ones nothing.
+    #[test]
+    fn noise_of_an_even_surface_is_no_slope() {
+        let (mut peaks, mut points) = line(Vec2::X, &[80.0; 20]);
+        widen(&mut peaks, &mut points, Vec2::Y, STRIPE);
+        assert!(peaks.iter().all(|k| k.sigma_px == SIGMA) && points.iter().all(|p| p.sigma_mm == SIGMA * MM));
+        // Of Gaussian noise the slope's variance is 0.1675 of a peak's here, and half of what it would add stays: what is
+        // above its expectation.
+        let mut seed = 1u32;
+        let mut uniform = move || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 8) as f32 / 16_777_216.0
+        };
+        let noisy: Vec<f32> = (0..4000)
+            .map(|_| 80.0 * (SIGMA / STRIPE * ((0..12).map(|_| uniform()).sum::<f32>() - 6.0)).exp())
+            .collect();
+        let (mut peaks, mut points) = line(Vec2::X, &noisy);
+        widen(&mut peaks, &mut points, Vec2::Y, STRIPE);
+        let squares = peaks.iter().map(|k| (k.sigma_px / SIGMA).powi(2)).sum::<f32>() / 4000.0;
+        let whole = 0.1675 * (3.75 / STRIPE).powi(2);
+        assert!((0.4..0.56).contains(&((squares - 1.0) / whole)), "{}", (squares - 1.0) / whole);
+    }
+
+    /// Where print ends from one pixel to the next the shift is the sheet's sigma at most, a few sigmas away nothing.
+    #[test]
+    fn an_edge_of_print_widens_only_beside_it_and_not_without_limit() {
+        let amplitudes: Vec<f32> = (0..40).map(|i| if i < 20 { 2.0 } else { 200.0 }).collect();
+        let (mut peaks, mut points) = line(Vec2::X, &amplitudes);
+        widen(&mut peaks, &mut points, Vec2::Y, STRIPE);
+        let most = 3.75f32.sqrt();
+        assert!((peaks[20].sigma_px / most - 1.0).abs() < 0.01, "{}", peaks[20].sigma_px);
+        assert!(peaks.iter().enumerate().all(|(i, k)| (18..=21).contains(&i) || k.sigma_px == SIGMA));
+    }
+
+    /// Points a pixel apart show the slope of a narrow stripe too; a sigma that is no number stays one.
+    #[test]
+    fn narrow_stripes_and_lost_fits() {
+        let amplitudes: Vec<f32> = (0..9).map(|i| 50.0 * (0.3 * i as f32).exp()).collect();
+        let (mut peaks, mut points) = line(Vec2::X, &amplitudes);
+        (peaks[4].sigma_px, points[4].sigma_mm) = (f32::INFINITY, f32::INFINITY);
+        widen(&mut peaks, &mut points, Vec2::Y, 0.7);
+        let want = SIGMA.hypot(0.24 * 0.3);
+        assert!((peaks[1].sigma_px / want - 1.0).abs() < 0.01, "{}", peaks[1].sigma_px);
+        assert!(points[4].sigma_mm == f32::INFINITY);
+    }
+
+    /// What is rejected shows no light, and a point alone on its line shows no slope.
+    #[test]
+    fn rejected_peaks_are_no_neighbours() {
+        use crate::stages::peak::found::Reject;
+        let (mut peaks, mut points) = line(Vec2::X, &[80.0, 10.0, 80.0, 10.0, 80.0]);
+        for i in [1, 3] {
+            peaks[i].refuse(Reject::Wide);
+            points[i] = Point::NONE;
+        }
+        widen(&mut peaks, &mut points, Vec2::Y, STRIPE);
+        assert!(peaks.iter().all(|k| k.sigma_px == SIGMA) && points[1].sigma_mm.is_nan());
+        let (mut alone, mut points) = line(Vec2::X, &[80.0]);
+        widen(&mut alone, &mut points, Vec2::Y, STRIPE);
+        assert_eq!(alone[0].sigma_px, SIGMA);
+    }
+}
