@@ -143,3 +143,21 @@ fn the_manifest_says_what_a_registry_shows() {
         assert!((1..=5).contains(&manifest["package"][key].as_array().unwrap().len()), "{key}");
     }
 }
+
+/// What serves people, a terminal or a browser is no part of the engine that other programs build on.
+#[test]
+fn the_engine_alone_needs_no_server_no_command_line_and_no_pages() {
+    let out = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        .args(["tree", "--locked", "--offline", "--package", "sheetlight", "--no-default-features"])
+        .args(["--edges", "normal", "--prefix", "none", "--format", "{p}"])
+        .current_dir(root())
+        .output()
+        .expect("cargo starts");
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let text = String::from_utf8(out.stdout).unwrap();
+    let crates: BTreeSet<&str> = text.lines().filter_map(|line| line.split(' ').next()).collect();
+    assert!(crates.contains("wgpu") && crates.contains("nalgebra"), "{text}");
+    for name in ["argon2", "axum", "clap", "maud", "mcap", "notify", "parquet", "rumqttc", "tokio", "ts-rs"] {
+        assert!(!crates.contains(name), "{name}");
+    }
+}

@@ -5,6 +5,7 @@ use super::format::RawFormat;
 use super::picture::PictureSource;
 use super::source::cell::CellCamera;
 use super::source::ffmpeg::Ffmpeg;
+#[cfg(feature = "folder")]
 use super::source::folder::FolderCamera;
 use super::source::pipe::Pipe;
 use super::source::play::Player;
@@ -12,6 +13,7 @@ use super::source::sim::{SimCamera, SimSpec};
 use crate::fault::{Fault, Result};
 use crate::geometry::AxisKind;
 use std::path::PathBuf;
+#[cfg(feature = "folder")]
 use std::time::Duration;
 
 /// A source of pictures, as named on the command line.
@@ -42,6 +44,7 @@ pub enum CameraUri {
         bits: u8,
     },
     /// `folder:PATH?bits=8&wait=60`: a folder that another program fills.
+    #[cfg(feature = "folder")]
     Folder {
         /// The folder.
         path: PathBuf,
@@ -113,6 +116,7 @@ impl std::str::FromStr for CameraUri {
                 Ok(CameraUri::Ffmpeg { arguments, bits: depth(bits)? })
             }
             "folder" | "play" if place.is_empty() => Err(format!("'{s}' names no folder: folder:PATH, play:RECORDING")),
+            #[cfg(feature = "folder")]
             "folder" => {
                 let [bits, wait] = options(query, ["bits", "wait"])?;
                 let (bits, wait_s) = (depth(bits)?, number("wait", wait, 60.0)?.clamp(0.0, 1e6));
@@ -210,6 +214,7 @@ impl CameraUri {
             #[cfg(feature = "gige")]
             CameraUri::Gige { word, packet } => Box::new(super::source::gige::GigeCamera::open(word, *packet)?),
             CameraUri::Ffmpeg { arguments, bits } => Box::new(Ffmpeg::open(arguments, *bits)?),
+            #[cfg(feature = "folder")]
             CameraUri::Folder { path, bits, wait_s } => {
                 Box::new(FolderCamera::open(path, *bits, Duration::from_secs_f64(*wait_s))?)
             }

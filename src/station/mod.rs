@@ -56,6 +56,7 @@ pub use find::{
 pub use ghost::{Lies, ghost};
 pub use guide::{GuideOptions, Guided, Step, guide};
 pub use import_map::import_map;
+#[cfg(feature = "pages")]
 pub use judge::embed::base64;
 pub use judge::figures::Judged;
 pub use judge::parts::{FoundPart, judge_parts};

@@ -3,6 +3,7 @@
 
 pub mod cell;
 pub mod ffmpeg;
+#[cfg(feature = "folder")]
 pub mod folder;
 #[cfg(feature = "gige")]
 pub mod gige;

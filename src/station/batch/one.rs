@@ -122,6 +122,7 @@ impl Bench<'_> {
         report.skipped.iter_mut().for_each(|(_, why)| *why = why.replace(&*here, "recording"));
         let text = serde_json::to_string_pretty(&report).expect("plain data");
         crate::files::write(&scan.join("scan.json"), text.as_bytes())?;
+        #[cfg(feature = "pages")]
         crate::station::judge::page::save(scan, None, &[])?;
         crate::files::remove(&scan.join("scan.lock")).map_err(|e| Fault::write(scan, e))?;
         (row.frame, row.shots, row.points) =

@@ -12,8 +12,8 @@ use std::path::Path;
 
 const HISTOGRAM_BINS: usize = 21;
 
-/// Compares a scan folder with `truth.json`. Writes `errors.json`, `error_picture.png` and a new page into it; the
-/// page also shows the `found` parts.
+/// Compares a scan folder with `truth.json`. Writes `errors.json`, `error_picture.png` and with feature `pages` a new
+/// page into it; the page also shows the `found` parts.
 pub fn judge(scan: &Path, truth: &Path, found: &[FoundPart]) -> Result<Judged> {
     let truth = Truth::load(truth)?;
     let cloud = CloudFile::open(&scan.join("cloud.ply"))?;
@@ -50,6 +50,9 @@ pub fn judge(scan: &Path, truth: &Path, found: &[FoundPart]) -> Result<Judged> {
     }
     let text = serde_json::to_string_pretty(&judged).expect("plain numbers");
     crate::files::write(&scan.join("errors.json"), text.as_bytes())?;
+    #[cfg(not(feature = "pages"))]
+    let _ = found;
+    #[cfg(feature = "pages")]
     crate::station::judge::page::save(scan, Some(&judged), found)?;
     Ok(judged)
 }

@@ -77,6 +77,7 @@ pub fn scan_on(
     let report = work.finish(label, rig, options, source.as_ref())?;
     let text = serde_json::to_string_pretty(&report).expect("plain data");
     crate::files::write(&part.join("scan.json"), text.as_bytes())?;
+    #[cfg(feature = "pages")]
     crate::station::judge::page::save(&part, None, &[])?;
     folder.commit()?;
     Ok(report)

@@ -324,9 +324,13 @@ fn contents(rig: &Rig) -> BTreeMap<Kind, String> {
 }
 
 /// Stores all records, their joint covariance (`joint.json`, valid only for these records) and the page
-/// (`joint.html`), all of them or none.
+/// (`joint.html`, with feature `pages`), all of them or none.
 pub fn store_joint(station: &Path, result: &JointResult) -> Result<Vec<Kind>> {
-    store_set(station, &result.rig, &result.together, result.page.html())
+    #[cfg(feature = "pages")]
+    let page = Some(result.page.html());
+    #[cfg(not(feature = "pages"))]
+    let page = None;
+    store_set(station, &result.rig, &result.together, page)
 }
 
 /// Stores in a station what [`store_joint`] has written into another folder, all of it or nothing.
@@ -347,7 +351,9 @@ pub fn accept_joint(kept: &Path, station: &Path) -> Result<Vec<Kind>> {
         Joint::Spoilt(why) => return Err(strange(why)),
         Joint::Absent => return Err(strange("holds no joint.json")),
     };
-    let page = crate::files::read_text(&kept.join("calibration").join(PAGE))?;
+    // A program without feature `pages` wrote none.
+    let page = kept.join("calibration").join(PAGE);
+    let page = page.is_file().then(|| crate::files::read_text(&page)).transpose()?;
     store_set(station, &rig, together, page)
 }
 
@@ -355,9 +361,10 @@ pub fn accept_joint(kept: &Path, station: &Path) -> Result<Vec<Kind>> {
 const COVARIANCE: &str = "joint.json";
 const PAGE: &str = "joint.html";
 
-fn store_set(station: &Path, rig: &Rig, together: &JointCovariance, page: String) -> Result<Vec<Kind>> {
+fn store_set(station: &Path, rig: &Rig, together: &JointCovariance, page: Option<String>) -> Result<Vec<Kind>> {
     rig.store_all_with(station, |stored| {
         let together = JointCovariance { of: contents(stored), ..together.clone() };
-        vec![(COVARIANCE, sealed(&together)), (PAGE, page)]
+        let page = page.map(|text| (PAGE, text));
+        std::iter::once((COVARIANCE, sealed(&together))).chain(page).collect()
     })
 }
