@@ -299,7 +299,7 @@ impl Scanner {
         let settings = &self.extraction.support;
         judged.par_iter_mut().for_each(|p| {
             support::ends::mark(&mut p.peaks, across, width, settings);
-            support::gradient::widen(&mut p.peaks, &mut p.points, across, width);
+            support::sigma::widen(&mut p.peaks, &mut p.points, across, width);
         });
         let mut done = std::mem::take(&mut self.early);
         done.extend(judged.into_iter().map(|p| self.profile(p)));

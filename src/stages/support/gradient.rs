@@ -1,5 +1,5 @@
-//! In: the peaks of one shot and their points. Out: the same; their standard deviations contain what the brightness of
-//! the surface may shift. Frame and unit: pixels of the shot, mm; docs/math.md, Stripe peak (7).
+//! In: a shot's line of peaks. Out: how far the brightness of the surface may have shifted each.
+//! Frame and unit: pixels of the shot; docs/math.md, Stripe peak (9) and (10).
 //!
 //! The sheet is a bell of light. A surface that grows brighter across it moves the light's middle to its brighter side,
 //! by the sheet's variance times the slope of the light's logarithm [curless95]. One shot shows this slope along the
@@ -7,8 +7,6 @@
 
 use super::line::{Line, near_px};
 use crate::stages::peak::found::Peak;
-use crate::stages::stripe::point::Point;
-use glam::Vec2;
 
 /// Variance of a picture's own blur, px²: the pixel's size and a good lens. The rest of a stripe's variance is the
 /// sheet's.
@@ -16,22 +14,11 @@ const BLUR: f32 = 0.25;
 /// The slope is that over the stripe's sigma to both sides, and at least over this, px.
 const LEAST_PX: f32 = 1.5;
 
-/// Widens the standard deviations of kept peaks and of their points. `across` is the unit vector across the stripe,
-/// `width_px` the stripe's Gaussian sigma.
-pub fn widen(peaks: &mut [Peak], points: &mut [Point], across: Vec2, width_px: f32) {
+/// Standard deviation of that shift for each peak of a line, px; `width_px` is the stripe's Gaussian sigma.
+pub(super) fn shifts(peaks: &[Peak], line: &Line, width_px: f32) -> impl Iterator<Item = f32> {
     let sheet = (width_px * width_px - BLUR).max(0.0);
-    let line = Line::new(peaks, across);
-    let slopes: Vec<f32> = (0..line.len()).map(|i| slope(peaks, &line, i, width_px)).collect();
-    for (i, slope) in slopes.into_iter().enumerate() {
-        let at = line.peak(i);
-        // Light that ends beside the sheet's middle moves it by the sheet's sigma at most.
-        let shift = sheet * slope.min(sheet.sqrt().recip());
-        if shift > 0.0 {
-            let stated = peaks[at].sigma_px;
-            peaks[at].sigma_px = stated.hypot(shift);
-            points[at].sigma_mm *= peaks[at].sigma_px / stated;
-        }
-    }
+    // Light that ends beside the sheet's middle moves it by the sheet's sigma at most.
+    (0..line.len()).map(move |i| sheet * slope(peaks, line, i, width_px).min(sheet.sqrt().recip()))
 }
 
 /// Size of the slope of the light's logarithm along the stripe at the `i`-th peak, 1/px, without what noise makes of
@@ -64,46 +51,43 @@ fn slope(peaks: &[Peak], line: &Line, i: usize, width_px: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stages::peak::found::Reject;
+    use glam::Vec2;
 
     const STRIPE: f32 = 2.0;
     const SIGMA: f32 = 0.01;
-    const MM: f32 = 0.1;
 
     /// Peaks a pixel apart along a direction with these amplitudes.
-    fn line(along: Vec2, amplitudes: &[f32]) -> (Vec<Peak>, Vec<Point>) {
+    fn peaks(along: Vec2, amplitudes: &[f32]) -> Vec<Peak> {
         let peak = |(i, &amplitude): (usize, &f32)| {
             let at = Vec2::new(200.0, 300.0) + along * i as f32;
             Peak { u: at.x, v: at.y, amplitude, width_px: STRIPE, sigma_px: SIGMA, ..Peak::default() }
         };
-        let peaks: Vec<Peak> = amplitudes.iter().enumerate().map(peak).collect();
-        let points = vec![Point { position: glam::Vec3::ZERO, sigma_mm: SIGMA * MM }; peaks.len()];
-        (peaks, points)
+        amplitudes.iter().enumerate().map(peak).collect()
+    }
+
+    fn shifts_of(peaks: &[Peak], across: Vec2, width_px: f32) -> Vec<f32> {
+        shifts(peaks, &Line::new(peaks, across), width_px).collect()
     }
 
     /// Light that grows by 5 % a pixel: the sheet's variance is 4 px² less the blur.
     #[test]
-    fn a_slope_of_the_light_widens_by_the_sheets_variance() {
+    fn a_slope_of_the_light_shifts_by_the_sheets_variance() {
         for degrees in [0.0f32, 42.0, 90.0, 135.0] {
             let along = Vec2::from_angle(degrees.to_radians());
             let amplitudes: Vec<f32> = (0..30).map(|i| 50.0 * (0.05 * i as f32).exp()).collect();
-            let (mut peaks, mut points) = line(along, &amplitudes);
-            widen(&mut peaks, &mut points, along.perp(), STRIPE);
-            let want = SIGMA.hypot(3.75 * 0.05);
-            for (k, p) in peaks.iter().zip(&points).take(28).skip(2) {
-                assert!((k.sigma_px / want - 1.0).abs() < 0.01, "{degrees} degrees: {} for {want}", k.sigma_px);
-                assert!((p.sigma_mm / (want * MM) - 1.0).abs() < 0.01);
+            let found = shifts_of(&peaks(along, &amplitudes), -along.perp(), STRIPE);
+            for shift in &found[2..28] {
+                assert!((shift / (3.75 * 0.05) - 1.0).abs() < 0.01, "{degrees} degrees: {shift}");
             }
         }
     }
 
-    /// Amplitudes that differ as much as their noise says add little on average, and even ones nothing.
+    /// An even surface has none. Of Gaussian noise the slope's variance is 0.1675 of a peak's here, and half of its
+    /// square stays: what is above its expectation.
     #[test]
     fn noise_of_an_even_surface_is_no_slope() {
-        let (mut peaks, mut points) = line(Vec2::X, &[80.0; 20]);
-        widen(&mut peaks, &mut points, Vec2::Y, STRIPE);
-        assert!(peaks.iter().all(|k| k.sigma_px == SIGMA) && points.iter().all(|p| p.sigma_mm == SIGMA * MM));
-        // Of Gaussian noise the slope's variance is 0.1675 of a peak's here, and half of what it would add stays: what is
-        // above its expectation.
+        assert!(shifts_of(&peaks(Vec2::X, &[80.0; 20]), -Vec2::Y, STRIPE).iter().all(|s| *s == 0.0));
         let mut seed = 1u32;
         let mut uniform = move || {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -112,49 +96,38 @@ mod tests {
         let noisy: Vec<f32> = (0..4000)
             .map(|_| 80.0 * (SIGMA / STRIPE * ((0..12).map(|_| uniform()).sum::<f32>() - 6.0)).exp())
             .collect();
-        let (mut peaks, mut points) = line(Vec2::X, &noisy);
-        widen(&mut peaks, &mut points, Vec2::Y, STRIPE);
-        let squares = peaks.iter().map(|k| (k.sigma_px / SIGMA).powi(2)).sum::<f32>() / 4000.0;
+        let found = shifts_of(&peaks(Vec2::X, &noisy), -Vec2::Y, STRIPE);
+        let square = found.iter().map(|s| (s / SIGMA).powi(2)).sum::<f32>() / 4000.0;
         let whole = 0.1675 * (3.75 / STRIPE).powi(2);
-        assert!((0.4..0.56).contains(&((squares - 1.0) / whole)), "{}", (squares - 1.0) / whole);
+        assert!((0.4..0.56).contains(&(square / whole)), "{}", square / whole);
     }
 
     /// Where print ends from one pixel to the next the shift is the sheet's sigma at most, a few sigmas away nothing.
     #[test]
-    fn an_edge_of_print_widens_only_beside_it_and_not_without_limit() {
+    fn an_edge_of_print_shifts_only_beside_it_and_not_without_limit() {
         let amplitudes: Vec<f32> = (0..40).map(|i| if i < 20 { 2.0 } else { 200.0 }).collect();
-        let (mut peaks, mut points) = line(Vec2::X, &amplitudes);
-        widen(&mut peaks, &mut points, Vec2::Y, STRIPE);
-        let most = 3.75f32.sqrt();
-        assert!((peaks[20].sigma_px / most - 1.0).abs() < 0.01, "{}", peaks[20].sigma_px);
-        assert!(peaks.iter().enumerate().all(|(i, k)| (18..=21).contains(&i) || k.sigma_px == SIGMA));
+        let found = shifts_of(&peaks(Vec2::X, &amplitudes), -Vec2::Y, STRIPE);
+        assert!((found[20] / 3.75f32.sqrt() - 1.0).abs() < 0.01, "{}", found[20]);
+        assert!(found.iter().enumerate().all(|(i, s)| (18..=21).contains(&i) || *s == 0.0));
     }
 
-    /// Points a pixel apart show the slope of a narrow stripe too; a sigma that is no number stays one.
+    /// Points a pixel apart show the slope of a narrow stripe too. A fit that states no finite sigma shows nothing.
     #[test]
     fn narrow_stripes_and_lost_fits() {
         let amplitudes: Vec<f32> = (0..9).map(|i| 50.0 * (0.3 * i as f32).exp()).collect();
-        let (mut peaks, mut points) = line(Vec2::X, &amplitudes);
-        (peaks[4].sigma_px, points[4].sigma_mm) = (f32::INFINITY, f32::INFINITY);
-        widen(&mut peaks, &mut points, Vec2::Y, 0.7);
-        let want = SIGMA.hypot(0.24 * 0.3);
-        assert!((peaks[1].sigma_px / want - 1.0).abs() < 0.01, "{}", peaks[1].sigma_px);
-        assert!(points[4].sigma_mm == f32::INFINITY);
+        let mut line = peaks(Vec2::X, &amplitudes);
+        line[4].sigma_px = f32::INFINITY;
+        let found = shifts_of(&line, -Vec2::Y, 0.7);
+        assert!((found[1] / (0.24 * 0.3) - 1.0).abs() < 0.03, "{}", found[1]);
+        assert_eq!(found[4], 0.0);
     }
 
     /// What is rejected shows no light, and a point alone on its line shows no slope.
     #[test]
     fn rejected_peaks_are_no_neighbours() {
-        use crate::stages::peak::found::Reject;
-        let (mut peaks, mut points) = line(Vec2::X, &[80.0, 10.0, 80.0, 10.0, 80.0]);
-        for i in [1, 3] {
-            peaks[i].refuse(Reject::Wide);
-            points[i] = Point::NONE;
-        }
-        widen(&mut peaks, &mut points, Vec2::Y, STRIPE);
-        assert!(peaks.iter().all(|k| k.sigma_px == SIGMA) && points[1].sigma_mm.is_nan());
-        let (mut alone, mut points) = line(Vec2::X, &[80.0]);
-        widen(&mut alone, &mut points, Vec2::Y, STRIPE);
-        assert_eq!(alone[0].sigma_px, SIGMA);
+        let mut line = peaks(Vec2::X, &[80.0, 10.0, 80.0, 10.0, 80.0]);
+        [1, 3].into_iter().for_each(|i| line[i].refuse(Reject::Wide));
+        assert_eq!(shifts_of(&line, -Vec2::Y, STRIPE), [0.0; 3]);
+        assert_eq!(shifts_of(&peaks(Vec2::X, &[80.0]), -Vec2::Y, STRIPE), [0.0]);
     }
 }

@@ -56,11 +56,19 @@ impl Line {
         self.sites[j].at.x - self.sites[i].at.x
     }
 
-    /// Neighbours of the `i`-th one up to this distance, on the side where the order goes on by `step`.
-    pub fn beside(&self, i: usize, step: isize, near: f32) -> impl Iterator<Item = usize> + '_ {
-        let here = self.sites[i].at;
+    /// How far the `j`-th one lies from the `i`-th across the stripe, px.
+    pub fn off(&self, i: usize, j: usize) -> f32 {
+        self.sites[j].at.y - self.sites[i].at.y
+    }
+
+    /// Those up to this distance along the stripe from the `i`-th one, on the side where the order goes on by `step`.
+    pub fn along(&self, i: usize, step: isize, reach: f32) -> impl Iterator<Item = usize> + '_ {
         std::iter::successors(i.checked_add_signed(step), move |j| j.checked_add_signed(step))
-            .take_while(move |&j| self.sites.get(j).is_some_and(|s| (s.at.x - here.x).abs() <= near))
-            .filter(move |&j| self.sites[j].at.distance(here) <= near)
+            .take_while(move |&j| j < self.len() && self.way(i, j).abs() <= reach)
+    }
+
+    /// Neighbours of the `i`-th one up to this distance, on that side.
+    pub fn beside(&self, i: usize, step: isize, near: f32) -> impl Iterator<Item = usize> + '_ {
+        self.along(i, step, near).filter(move |&j| self.sites[j].at.distance(self.sites[i].at) <= near)
     }
 }

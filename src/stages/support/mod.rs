@@ -11,10 +11,12 @@ use crate::geometry::Vec3;
 use crate::gpu::Device;
 pub mod ends;
 mod gpu;
-pub mod gradient;
+mod gradient;
 mod line;
 pub mod params;
+pub mod sigma;
 pub(in crate::stages) mod stage;
+mod steps;
 
 pub use stage::{STAGE, cases, stage_twin};
 
