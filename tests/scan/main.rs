@@ -23,4 +23,5 @@ mod resume;
 mod round_parts;
 mod shift_scan;
 mod speckle_grain;
+mod steps;
 mod wide_stripes;
