@@ -3,6 +3,7 @@
 # make test   everything, on software Vulkan where it can be had
 # make gentl  the GenTL producer, by which GenICam programs see a 3-D camera: target/release/sheetlight.cti
 # make opcua  the OPC UA server beside a station: target/release/sheetlight-opcua
+# make ros2   the sender of live messages to ROS 2: target/release/sheetlight-ros2
 # make bench  figures of this machine;  make bench-peers  side by side with OpenCV and numba
 
 CARGO ?= cargo
@@ -11,8 +12,8 @@ VENV := .venv
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 export XDG_RUNTIME_DIR ?= $(shell mktemp -d /tmp/sheetlight-run.XXXXXX)
 
-.PHONY: station browser demo pages book lint test gentl opcua bench bench-entries bench-peers vulkan python notebooks \
-	pictures cameras build clean
+.PHONY: station browser demo pages book lint test gentl opcua ros2 bench bench-entries bench-peers vulkan python \
+	notebooks pictures cameras build clean
 
 demo: vulkan build
 	$(TARGET)/release/sheetlight demo --out demo
@@ -24,12 +25,13 @@ station: vulkan build
 build:
 	$(CARGO) build --release --locked
 
-# All packages at once: so the library has the same features for all of them, and is compiled once. The OPC UA server has
-# nothing of the library; its test runs the program that was built before.
+# All packages at once: so the library has the same features for all of them, and is compiled once. OPC UA and ROS 2
+# have nothing of the library; their tests run the program that was built before.
 test: vulkan python cameras browser lint
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(if $(SHEETLIGHT_REQUIRE_GPU),,SHADER_TWIN_ALLOW_SKIP=1) \
 		$(CARGO) test --locked --package sheetlight --package shader-twin --package sheetlight-gentl -- --show-output
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(CARGO) test --locked --package sheetlight-opcua -- --show-output
+	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(CARGO) test --locked --package sheetlight-ros2 -- --show-output
 
 # A toolchain without clippy says so and goes on.
 # The pages of the screen: format and types.
@@ -44,7 +46,8 @@ lint: pages book
 	if $(CARGO) clippy --version >/dev/null 2>&1; then \
 		$(CARGO) clippy --locked --package sheetlight --package shader-twin --package sheetlight-gentl --all-targets \
 			-- -D warnings && \
-		$(CARGO) clippy --locked --package sheetlight-opcua --all-targets -- -D warnings; \
+		$(CARGO) clippy --locked --package sheetlight-opcua --all-targets -- -D warnings && \
+		$(CARGO) clippy --locked --package sheetlight-ros2 --all-targets -- -D warnings; \
 	else echo "clippy is not installed: skipped"; fi
 	$(CARGO) check --locked --package outside
 	if $(CARGO) clippy --version >/dev/null 2>&1; then \
@@ -59,6 +62,10 @@ gentl:
 # The OPC UA server beside a station.
 opcua:
 	$(CARGO) build --release --locked --package sheetlight-opcua
+
+# Live messages to ROS 2.
+ros2:
+	$(CARGO) build --release --locked --package sheetlight-ros2
 
 bench: vulkan build
 	$(TARGET)/release/sheetlight bench

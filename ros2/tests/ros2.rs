@@ -1,0 +1,45 @@
+//! In: this program and the program `sheetlight`. Out: failure where readers that share no code with it (Zenoh's own
+//! subscribers, rosbags) see other messages than the scan has, or where broken input does harm (ros2.py).
+//! Frame and unit: m; s.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The program `sheetlight`: beside this one, where `make test` builds it before, or the one that SHEETLIGHT_BIN names.
+fn sheetlight() -> Option<PathBuf> {
+    let beside = Path::new(env!("CARGO_BIN_EXE_sheetlight-ros2")).with_file_name("sheetlight");
+    let named = std::env::var_os("SHEETLIGHT_BIN").map(PathBuf::from);
+    named.or(Some(beside)).filter(|program| program.is_file())
+}
+
+fn skipped(why: &str) {
+    assert!(std::env::var("CI").as_deref() != Ok("true"), "{why}");
+    eprintln!("\n*** SKIPPED: {why} ***\n");
+}
+
+#[test]
+fn subscribers_of_zenoh_get_the_scan_in_the_form_of_rmw_zenoh() {
+    let Some(sheetlight) = sheetlight() else {
+        return skipped("the program sheetlight is not built: cargo build --package sheetlight, or make test");
+    };
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = tempfile::tempdir().unwrap();
+    // The long form relays profiles for a minute.
+    let seconds = if std::env::var_os("SHEETLIGHT_LONG").is_some() { "60" } else { "4" };
+    let run = Command::new("python3")
+        .arg(here.join("tests/ros2.py"))
+        .arg(env!("CARGO_BIN_EXE_sheetlight-ros2"))
+        .arg(&sheetlight)
+        .arg(folder.path())
+        .arg(seconds)
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .output();
+    match run {
+        Ok(done) if done.status.success() => print!("{}", String::from_utf8_lossy(&done.stdout)),
+        Ok(done) if done.status.code() == Some(77) => skipped(&String::from_utf8_lossy(&done.stdout)),
+        Ok(done) => {
+            panic!("{}{}", String::from_utf8_lossy(&done.stdout), String::from_utf8_lossy(&done.stderr))
+        }
+        Err(e) => skipped(&format!("python3: {e}")),
+    }
+}
