@@ -4,6 +4,8 @@
 
 #[path = "common/mod.rs"]
 mod common;
+#[path = "mcap/live.rs"]
+mod live;
 #[path = "mcap/refused.rs"]
 mod refused;
 #[path = "mcap/wire.rs"]

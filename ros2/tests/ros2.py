@@ -10,7 +10,6 @@ import os
 import pathlib
 import signal
 import socket
-import struct
 import subprocess
 import sys
 import threading
@@ -21,8 +20,8 @@ try:
     import mcap.writer
     import numpy as np
     import xxhash
-    import zenoh
     import zenoh.ext
+    from hears import Heard, attachment, free_port, session, tokens, until
     from rosbags.typesys import Stores, get_typestore
 except ImportError as e:
     print(f"a Python package is missing: {e}: tools/python-env.sh .venv files")
@@ -33,51 +32,6 @@ folder, SECONDS = pathlib.Path(folder), float(seconds)
 program, sheetlight = os.path.abspath(program), os.path.abspath(sheetlight)
 STORE = get_typestore(Stores.ROS2_JAZZY)
 KEPT = {"/tf_static", "/sheetlight/cloud", "/diagnostics"}
-
-
-def until(what, limit=20.0):
-    """Waits until it is true, and returns it."""
-    end = time.monotonic() + limit
-    while not (got := what()):
-        assert time.monotonic() < end, f"not within {limit} s"
-        time.sleep(0.01)
-    return got
-
-
-def free_port():
-    with socket.create_server(("127.0.0.1", 0)) as s:
-        return s.getsockname()[1]
-
-
-def session(mode, **endpoints):
-    """A session that finds nobody by itself."""
-    config = zenoh.Config()
-    config.insert_json5("mode", f'"{mode}"')
-    config.insert_json5("scouting/multicast/enabled", "false")
-    config.insert_json5("scouting/gossip/enabled", "false")
-    # By default a router drops what a busy machine does not take within a millisecond.
-    config.insert_json5("transport/link/tx/queue/size/data", "16")
-    config.insert_json5("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "2000000")
-    for key in ["listen", "connect"]:
-        address = endpoints.get(key)
-        config.insert_json5(f"{key}/endpoints", f'["{address}"]' if address else "[]")
-    return zenoh.open(config)
-
-
-class Heard:
-    """A subscriber of all topics of a domain."""
-
-    def __init__(self, at, key="0/**"):
-        self.samples = []
-        self.subscriber = at.declare_subscriber(key, self.take)
-
-    def take(self, sample):
-        self.samples.append(
-            (str(sample.key_expr), sample.payload.to_bytes(), sample.attachment.to_bytes(), time.time())
-        )
-
-    def of(self, topic, domain=0):
-        return [s for s in self.samples if s[0].startswith(f"{domain}{topic}/")]
 
 
 BEGUN = []
@@ -102,12 +56,6 @@ def ended(process, code=0, limit=30):
 def dds(kind):
     package, sub, name = kind.split("/")
     return f"{package}::{sub}::dds_::{name}_"
-
-
-def attachment(data):
-    """Number, time, identity."""
-    assert len(data) == 33 and data[16] == 16, data
-    return *struct.unpack("<qq", data[:16]), data[17:]
 
 
 # ---- a scan, and what rmw_zenoh would have to see of it
@@ -143,10 +91,6 @@ def same_points(samples):
         off = np.abs(seen[axis].astype(np.float64) - wanted)
         assert (off <= np.spacing(np.abs(wanted).astype(np.float32))).all(), off.max()
     assert (seen["shot"] == truth["shot"]).all()
-
-
-def tokens(at, domain):
-    return {str(r.ok.key_expr) for r in at.liveliness().get(f"@ros2_lv/{domain}/**")}
 
 
 def expected(node, messages, topic, prefix=""):
@@ -325,7 +269,7 @@ def streamed():
         until(lambda: len(heard.samples) >= count, 5)
     missing = sorted(set(range(1, count + 1)) - {attachment(s[2])[0] for s in heard.samples})
     assert not missing, f"{len(missing)} of {count} are missing: {missing[:20]}"
-    delays = sorted(s[3] - STORE_TIME(s) for s in heard.samples)
+    delays = sorted(s[3] - sent_at(s) for s in heard.samples)
     assert [s[1] for s in heard.samples] == [messages[n % 1000] for n in range(count)], "lost or out of order"
     assert [attachment(s[2])[0] for s in heard.samples] == list(range(1, count + 1))
     grown = peak(process) - before
@@ -343,9 +287,41 @@ def streamed():
     print(f"  subscriber (median, largest {delays[-1] * 1e3:.0f}), beside a deaf one; {grown / 1e6:.1f} MB more memory")
 
 
-def STORE_TIME(sample):
+def sent_at(sample):
     """When the relay sent it, s."""
     return attachment(sample[2])[1] / 1e9
+
+
+def camera(address, at, messages):
+    """Each profile of a running camera is with the subscriber before the next picture is taken."""
+    heard = Heard(at)
+    raw = ["--raw", "320x240:gray8", "--station", "cell/station", "--on", "cpu"]
+    live = begin(sheetlight, "live", *raw, "--mcap", "-", cwd=folder, stdin=subprocess.PIPE)
+    process = relay("-", "--connect", address, stdin=live.stdout)
+    live.stdout.close()
+    pictures = [data for _, topic, data, _ in messages if topic == "/sheetlight/picture"]
+    delays = []
+    for n, data in enumerate(pictures[:20]):
+        picture = STORE.deserialize_cdr(data, "sensor_msgs/msg/Image")
+        assert picture.encoding == "mono8" and picture.data.size == 320 * 240
+        sent = time.time()
+        live.stdin.write(picture.data.tobytes())
+        live.stdin.flush()
+        until(lambda n=n: len(heard.of("/sheetlight/profile")) == n + 1)
+        topic, payload, _, came = heard.of("/sheetlight/profile")[-1]
+        delays.append(came - sent)
+        profile = STORE.deserialize_cdr(payload, "sensor_msgs/msg/PointCloud2")
+        stamp = profile.header.stamp.sec + profile.header.stamp.nanosec / 1e9
+        assert profile.header.frame_id == "camera" and profile.width > 50
+        assert sent - 0.001 <= stamp <= came, (sent, stamp, came)
+    live.stdin.close()
+    assert live.wait(20) == 0, live.stderr.read()
+    ended(process)
+    until(lambda: heard.of("/diagnostics"))
+    assert len(heard.of("/tf_static")) == 1
+    heard.subscriber.undeclare()
+    delays = sorted(delays[1:])
+    print(f"from a picture to its profile at a subscriber: {delays[len(delays) // 2] * 1e3:.0f} ms (median)")
 
 
 # ---- what is not as it should be
@@ -442,6 +418,7 @@ def main():
         ("played", lambda: played(address, at, messages)),
         ("elsewhere", lambda: elsewhere(address, at, messages)),
         ("streamed", streamed),
+        ("camera", lambda: camera(address, at, messages)),
         ("broken", lambda: broken(address, at)),
         ("router lost", lambda: router_lost(messages)),
     ]:

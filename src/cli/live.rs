@@ -1,16 +1,19 @@
 //! In: a running camera, a station. Out: one line per measured picture with its points, its latency and the number
-//! of skipped pictures; the account. Frame and unit: camera frame, mm; milliseconds.
+//! of skipped pictures, or messages of ROS 2 instead; the account. Frame and unit: camera frame, mm; milliseconds.
 
 use super::capture::options::Running;
 use super::terminal::console::Console;
+use super::terminal::outputs::{self, Inputs};
 use crate::capture::{CameraUri, Delays, Fate, Fed, Mode, Pictures, RawFormat, now_ns};
 use crate::fault::{Fault, Result};
+use crate::files::Aside;
 use crate::raster::Light;
 use crate::rig::Rig;
+use crate::ros::LiveBag;
 use crate::scan::{Live, Where};
 use crate::stages::stripe::point::Point;
 use crate::station::Settings;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Measure the stripe in the newest picture of a running camera
@@ -24,6 +27,7 @@ use std::time::Duration;
   sheetlight live --camera ffmpeg:/dev/video0 --station cell3 --points > profiles.jsonl
   camera-tool --raw | \\
       sheetlight live --raw 4096x3072:gray12le --station cell3 --points > profiles.jsonl
+  sheetlight live --camera gige://first --station cell3 --mcap - | sheetlight-ros2 -
 All options: sheetlight help live
 Guide: docs/live.md")]
 pub struct Args {
@@ -38,6 +42,9 @@ pub struct Args {
     /// Also print the points: [x, y, z, sigma] in the camera frame, mm
     #[arg(long)]
     points: bool,
+    /// Write the points as messages of ROS 2 into a new MCAP file; - is standard output, in place of the lines
+    #[arg(long, value_name = "FILE|-")]
+    mcap: Option<PathBuf>,
     /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
     #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
@@ -58,7 +65,28 @@ struct Line {
 
 const GLANCE: Duration = Duration::from_millis(200);
 
+/// The file of --mcap, none for standard output.
+fn mcap_file<'a>(args: &'a Args, console: &Console) -> Result<Option<&'a Path>> {
+    let Some(path) = args.mcap.as_deref() else { return Ok(None) };
+    if path.as_os_str() == "-" {
+        let other = if args.points { Some("--points") } else { console.json.then_some("--json") };
+        return other.map_or(Ok(None), |other| {
+            Err(Fault::usage(format!("--mcap - and {other}: both would write to standard output"))
+                .cause("a stream of MCAP has no room for lines of JSON")
+                .next("give --mcap a file, or exclude one of the two"))
+        });
+    }
+    outputs::check(&[path], &Inputs { files: &[], scans: &[], station: Some(&args.station) })?;
+    if path.symlink_metadata().is_ok() {
+        return Err(Fault::usage(format!("{}: is there already", path.display()))
+            .cause("an earlier file, which is not replaced")
+            .next("remove it, or give another --mcap"));
+    }
+    Ok(Some(path))
+}
+
 pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let path = mcap_file(args, console)?;
     let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
     let volume = crate::station::volume::believed(&settings, &rig);
     let mut running = args.running.clone();
@@ -71,6 +99,14 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         args.raw.map(|raw| begin(Pictures { format: raw.format, readout: running.readout.stated() })).transpose()?;
     let feed = running.open(args.raw, Mode::Newest)?;
     let mut live = early.map_or_else(|| begin(feed.pictures()), Ok)?;
+    let sheet = rig.need_laser_plane()?.value;
+    let aside = path.map(Aside::create).transpose()?;
+    let mut bag = match (&aside, &args.mcap) {
+        (Some(aside), Some(path)) => Some(LiveBag::file(aside.file(), path, sheet, live.stripe_along())?),
+        (None, Some(_)) => Some(LiveBag::stream(std::io::stdout(), sheet, live.stripe_along())?),
+        _ => None,
+    };
+    let lines = bag.is_none() || path.is_some();
     let (mut teller, bar) = (running.teller(), console.bar("live", 0));
     let (mut waits, mut measured_count) = (Delays::default(), 0usize);
     let (mut without_stripe, mut unlit) = (0, None);
@@ -84,6 +120,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         // Only examined until something was measured, because it takes as long as a stage.
         let light = (measured_count == 0).then(|| Light::of(&picture.image));
         let frame = picture.id;
+        let at = bag.as_mut().map(|bag| bag.time(&picture));
         let measured = live.measure(frame as u32, picture.image)?;
         feed.fate(Fate::Used);
         let Some(measured) = measured else {
@@ -94,6 +131,16 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         let latency_ms = now_ns().saturating_sub(picture.host_ns) as f64 * 1e-6;
         measured_count += 1;
         waits.add(latency_ms);
+        teller.watch(&feed, || format!("{} ", delays(&waits)));
+        teller.tell(console, &bar);
+        if let (Some(bag), Some(at)) = (&mut bag, at)
+            && !bag.profile(at, &live.cloud(&measured))?
+        {
+            return Ok(());
+        }
+        if !lines {
+            continue;
+        }
         let there = measured.points.iter().filter(|p| p.sigma_mm.is_finite());
         let list = |p: &Point| [p.position[0], p.position[1], p.position[2], p.sigma_mm];
         let line = Line {
@@ -104,21 +151,30 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             xyz_sigma_mm: args.points.then(|| there.map(list).collect()),
         };
         if !console.line(&line) {
-            return Ok(());
+            break None;
         }
-        teller.watch(&feed, || format!("{} ", delays(&waits)));
-        teller.tell(console, &bar);
     };
     bar.finish_and_clear();
     teller.last_word(&feed);
     let a = feed.account();
-    console.say(format!(
-        "{} frames: {measured_count} measured, {} skipped, {without_stripe} without a stripe; latency {}; {}",
+    let summary = format!(
+        "{} frames: {measured_count} measured, {} skipped, {without_stripe} without a stripe; latency {}",
         a.complete,
         a.dropped_processing,
         delays(&waits),
-        live.ran_on()
-    ));
+    );
+    let values = [
+        ("frames", a.complete.to_string()),
+        ("measured", measured_count.to_string()),
+        ("skipped", a.dropped_processing.to_string()),
+        ("without_stripe", without_stripe.to_string()),
+        ("latency", delays(&waits)),
+        ("ran_on", live.ran_on()),
+    ];
+    let values = values.map(|(key, value)| (key.to_owned(), value)).into();
+    bag.map(|bag| bag.finish(&summary, ended.is_some(), values)).transpose()?;
+    aside.map(Aside::keep).transpose()?;
+    console.say(format!("{summary}; {}", live.ran_on()));
     if a.sent != a.complete {
         console.say(format!("the camera: {a}"));
     }

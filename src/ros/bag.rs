@@ -1,4 +1,5 @@
-//! In: messages with topic and time. Out: an MCAP file of profile ros2 with these messages and their index.
+//! In: messages with topic and time. Out: an MCAP file of profile ros2 with these messages and their index, or a
+//! stream.
 //! Frame and unit: none.
 
 use super::cdr::Cdr;
@@ -6,11 +7,12 @@ use super::definitions::Kind;
 use super::messages::Stamp;
 use crate::fault::{Fault, Result};
 use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions, Writer};
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::fs::File;
-use std::io::{BufWriter, ErrorKind};
+use std::io::{BufWriter, ErrorKind, Seek, Write};
 use std::path::{Path, PathBuf};
 
 /// Topics of the messages.
@@ -86,11 +88,24 @@ struct Channel {
     messages: u32,
 }
 
+/// A buffer before a file or a pipe.
+trait Target: Write + Seek {}
+
+impl<T: Write + Seek> Target for T {}
+
+/// Bytes of messages that wait for the file or pipe.
+const BUFFER: usize = 1 << 20;
+
 /// The file during writing. Messages are written to the disk as they come; chunks are not compressed.
 pub struct Bag<'a> {
     path: PathBuf,
-    writer: Writer<BufWriter<&'a File>>,
+    writer: Writer<Box<dyn Target + 'a>>,
     channels: BTreeMap<Topic, Channel>,
+}
+
+fn options() -> WriteOptions {
+    let library = format!("sheetlight {}", env!("CARGO_PKG_VERSION"));
+    WriteOptions::new().compression(None).profile("ros2").library(library)
 }
 
 impl<'a> Bag<'a> {
@@ -99,13 +114,29 @@ impl<'a> Bag<'a> {
     /// # Errors
     /// The file cannot be written. The other functions here fail only for this reason.
     pub fn new(file: &'a File, path: &Path) -> Result<Bag<'a>> {
-        let options = WriteOptions::new()
-            .compression(None)
-            .profile("ros2")
-            .library(format!("sheetlight {}", env!("CARGO_PKG_VERSION")))
-            .chunk_size(Some(CHUNK));
-        let writer = options.create(BufWriter::with_capacity(1 << 20, file)).map_err(|e| fault(path, e))?;
+        let target: Box<dyn Target + 'a> = Box::new(BufWriter::with_capacity(BUFFER, file));
+        Bag::begun(options().chunk_size(Some(CHUNK)), target, path)
+    }
+
+    /// Begins a stream, which nobody reads twice: it has no chunks and no index, so that no memory grows with it.
+    /// [`Bag::flush`] hands on what was written.
+    pub fn stream(pipe: impl Write + 'a, name: &Path) -> Result<Bag<'a>> {
+        let target: Box<dyn Target + 'a> = Box::new(NoSeek::new(BufWriter::with_capacity(BUFFER, pipe)));
+        Bag::begun(options().use_chunks(false), target, name)
+    }
+
+    fn begun(options: WriteOptions, target: Box<dyn Target + 'a>, path: &Path) -> Result<Bag<'a>> {
+        let writer = options.create(target).map_err(|e| fault(path, e))?;
         Ok(Bag { path: path.to_owned(), writer, channels: BTreeMap::new() })
+    }
+
+    /// Hands everything on that was written. False if nobody reads it any more.
+    pub fn flush(&mut self) -> Result<bool> {
+        match self.writer.flush() {
+            Ok(()) => Ok(true),
+            Err(McapError::Io(e)) if e.kind() == ErrorKind::BrokenPipe => Ok(false),
+            Err(e) => Err(fault(&self.path, e)),
+        }
     }
 
     /// Adds a metadata record of texts.
@@ -139,7 +170,7 @@ impl<'a> Bag<'a> {
     pub fn finish(mut self) -> Result<BTreeMap<Topic, u32>> {
         self.writer.finish().map_err(|e| fault(&self.path, e))?;
         let counts = self.channels.iter().map(|(topic, c)| (*topic, c.messages)).collect();
-        self.writer.into_inner().into_inner().map_err(|e| Fault::write(&self.path, e.into_error()))?;
+        self.writer.into_inner().flush().map_err(|e| Fault::write(&self.path, e))?;
         Ok(counts)
     }
 }

@@ -122,9 +122,57 @@ impl Clock {
     }
 }
 
+/// The clock of a running camera: the time of each picture as it comes. The quickest picture so far sets the camera's
+/// clock against the host's.
+#[derive(Clone, Debug, Default)]
+pub struct Running {
+    /// Lead of the host's clock over the camera's, and the camera's time at which it was found, ns.
+    set: Option<(i128, u64)>,
+}
+
+/// Largest drift of two clocks, as a share. A lead that was found earlier grows by it, so that it does not stay behind.
+const DRIFT: i128 = 10_000;
+/// A clock that leaps by more was set anew, ns.
+const LEAP: i128 = 1_000_000_000;
+
+impl Running {
+    /// Time of a picture: the start of its exposure by the camera's clock, else its arrival less the exposure. All in
+    /// ns; the latest time that a message can hold is the limit.
+    pub fn at(&mut self, device_ns: Option<u64>, host_ns: u64, exposure_ns: Option<u64>) -> Stamp {
+        let exposed = exposure_ns.unwrap_or(0);
+        let Some(device) = device_ns else { return Stamp(host_ns.saturating_sub(exposed).min(LATEST)) };
+        let lead = i128::from(host_ns) - i128::from(device) - i128::from(exposed);
+        let lead = match self.set {
+            Some((before, then)) if then <= device => {
+                let grown = before + i128::from(device - then) / DRIFT;
+                if lead - grown > LEAP { lead } else { lead.min(grown) }
+            }
+            _ => lead,
+        };
+        self.set = Some((lead, device));
+        Stamp((i128::from(device) + lead).clamp(0, i128::from(LATEST)) as u64)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_running_camera_is_dated_by_its_quickest_picture() {
+        let (mut clock, ms) = (Running::default(), 1_000_000);
+        let at = |c: &mut Running, device: u64, host: u64| c.at(Some(device), host, Some(2 * ms)).0;
+        // 10, 4 and 9 ms from the end of the exposure to the arrival.
+        assert_eq!(at(&mut clock, 0, 1_012 * ms), 1_010 * ms);
+        assert_eq!(at(&mut clock, 100 * ms, 1_106 * ms), 1_104 * ms);
+        assert_eq!(at(&mut clock, 200 * ms, 1_211 * ms), 1_204 * ms + 10_000);
+        // The camera's clock starts again.
+        assert_eq!(at(&mut clock, 5 * ms, 1_400 * ms), 1_398 * ms);
+        // It leaps back by an hour as seen from the host, which is later than any transfer.
+        assert_eq!(at(&mut clock, 6 * ms, 3_600_000 * ms), 3_599_998 * ms);
+        assert_eq!(Running::default().at(None, 50 * ms, Some(ms)).0, 49 * ms);
+        assert_eq!(Running::default().at(None, u64::MAX, None).0, LATEST);
+    }
 
     fn taken(device_ns: Option<u64>, host_ns: u64) -> Taken {
         let text = serde_json::json!({"id": 1, "device_ns": device_ns, "host_ns": host_ns, "exposure_ns": 1000});

@@ -14,7 +14,7 @@ use crate::rig::{Rig, Volume};
 use crate::stages::peak::Stripe;
 use crate::stages::peak::found::{Peak, SATURATED};
 use crate::stages::peak::params::PeakParams;
-use crate::stages::stripe::point::Optics;
+use crate::stages::stripe::point::{Optics, Point};
 use crate::stages::support::{self, Support};
 use rayon::prelude::*;
 
@@ -314,23 +314,30 @@ impl Scanner {
     fn profile(&self, judged: support::Profile<Place>) -> Profile {
         let place = &judged.cargo;
         let limit = self.extraction.choose.uncertain * self.width_px();
-        let points = judged
-            .peaks
-            .iter()
-            .zip(&judged.points)
-            .filter(|(k, _)| k.kept())
-            .map(|(k, p)| CloudPoint {
-                position: p.position,
-                sigma_mm: with_place(p.sigma_mm, &p.position, place),
-                intensity: k.amplitude,
-                quality: quality(k, limit),
-                shot: judged.shot,
-                u: k.u,
-                v: k.v,
-            })
-            .collect();
+        let sigma = |p: &Point| with_place(p.sigma_mm, &p.position, place);
+        let points = accepted(judged.shot, &judged.peaks, &judged.points, limit, sigma);
         Profile { shot: judged.shot, from_camera: place.from_camera, peaks: judged.peaks, points }
     }
+}
+
+/// The points of the accepted peaks. `limit_px` is the largest standard deviation of an accepted peak.
+pub(super) fn accepted(
+    shot: u32,
+    peaks: &[Peak],
+    points: &[Point],
+    limit_px: f32,
+    sigma_mm: impl Fn(&Point) -> f32,
+) -> Vec<CloudPoint> {
+    let point = |(k, p): (&Peak, &Point)| CloudPoint {
+        position: p.position,
+        sigma_mm: sigma_mm(p),
+        intensity: k.amplitude,
+        quality: quality(k, limit_px),
+        shot,
+        u: k.u,
+        v: k.v,
+    };
+    peaks.iter().zip(points).filter(|(k, _)| k.kept()).map(point).collect()
 }
 
 /// The standard deviation along the worst direction, with the pose's contribution.
