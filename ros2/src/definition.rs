@@ -54,6 +54,8 @@ pub struct Definition {
 
 /// Most types of types in each other.
 const DEEPEST: usize = 32;
+/// Most characters of a name.
+pub const LONGEST: usize = 255;
 /// Most bytes of a schema.
 pub const MOST_BYTES: usize = 1 << 20;
 
@@ -82,7 +84,7 @@ impl Definition {
             return Err(format!("its schema has {} bytes, at most {MOST_BYTES} are read", text.len()));
         }
         let text = std::str::from_utf8(text).map_err(|_| "its schema is no UTF-8".to_owned())?;
-        let root = full_name(name).filter(|full| full == name);
+        let root = full_name(name).filter(|full| full == name && name.len() <= LONGEST);
         let root = root.ok_or_else(|| format!("its type '{name}' is not like package/msg/Name"))?;
         let mut types = BTreeMap::new();
         for (at, part) in parts(text).enumerate() {

@@ -1,7 +1,7 @@
 //! In: domain, namespace, topic, type and hash. Out: the key expressions and liveliness tokens by which rmw_zenoh
 //! finds them.
 
-use super::definition::is_word;
+use super::definition::{LONGEST, is_word};
 
 /// Name of the node.
 pub const NODE: &str = "sheetlight";
@@ -21,7 +21,7 @@ pub fn is_name(name: &str) -> bool {
     let word = |w: &str| {
         is_word(w) || w.strip_prefix('_').is_some_and(|w| w.chars().all(|c| c.is_ascii_alphanumeric() || c == '_'))
     };
-    name.strip_prefix('/').is_some_and(|rest| rest.split('/').all(word))
+    name.len() <= LONGEST && name.strip_prefix('/').is_some_and(|rest| rest.split('/').all(word))
 }
 
 /// The type's name in DDS: `package::msg::dds_::Name_`.
@@ -103,6 +103,7 @@ mod tests {
         for good in ["/a", "/a/b_1", "/_hidden", "/tf_static"] {
             assert!(is_name(good), "{good}");
         }
+        assert!(is_name(&format!("/{}", "a".repeat(254))) && !is_name(&format!("/{}", "a".repeat(255))));
         for bad in ["", "/", "a", "/a/", "//a", "/1a", "/a b", "/a*", "/ü", "/a/$b", "/a%b"] {
             assert!(!is_name(bad), "{bad}");
         }
