@@ -153,7 +153,7 @@ fn config(options: &Options) -> Result<zenoh::Config, Fault> {
         None => ("client", Some(options.connect.as_deref().unwrap_or(HERE)), None),
     };
     // A router takes what it gets; the wait bridges a moment in which the machine is busy. A subscriber that is
-    // connected here and does not read would cost that wait with every message.
+    // connected here and does not read costs that wait whenever its link is full.
     let patience_us = if options.listen.is_some() { 1_000 } else { 20_000 };
     let list = |endpoint: Option<&str>| serde_json::json!(endpoint.into_iter().collect::<Vec<_>>()).to_string();
     let settings = [
