@@ -137,7 +137,7 @@ fn scans() {
     });
     let folder = scratch();
     let sheet = Plane::new(Vec3::new(0.0, 0.6, 0.8), 72.5).unwrap();
-    let mut list = ShotsWriter::create(folder.path(), "base", Along::U, "rig", &sheet).unwrap();
+    let mut list = ShotsWriter::create(folder.path(), "base", Along::U, "rig", Some(&sheet)).unwrap();
     (0..3).for_each(|shot| list.add(shot, Rigid::identity()));
     list.checkpoint().unwrap();
     let path = folder.path().join(SHOTS_FILE);
@@ -418,7 +418,7 @@ fn height_maps() {
 
 #[test]
 fn profiles() {
-    use sheetlight::calibrate::ball::profiles::{from_csv, from_yaml};
+    use sheetlight::recording::profiles::{from_csv, from_yaml};
     let csv = "profile,x,z\n0,1.5,2.5\n0,2.5,3.5\n1,1,2\n1,2,3\n";
     let yaml = "%YAML:1.0\na: !!opencv-matrix\n   rows: 2\n   cols: 3\n   dt: f\n   data: [ 1., 2., 3., 4., 5., 6. ]\n";
     survives("profiles as CSV", seeds(&[csv]), |b| from_csv(&text(b), "a").map(drop));
@@ -427,7 +427,7 @@ fn profiles() {
     survives(
         "profiles in brackets",
         seeds(&brackets),
-        through_file("p.json", |p| sheetlight::calibrate::ball::profiles::load(p).map(drop)),
+        through_file("p.json", |p| sheetlight::recording::profiles::load(p).map(drop)),
     );
 }
 

@@ -7,7 +7,10 @@ use super::find::{batch, filter, ghost, import_map, locate as find, matching, mo
 use super::insert::{guide, job, robot, sweep};
 use super::terminal::console::Console;
 use super::terminal::threads;
-use super::{bench, board, calibrate, cell, demo, live, range, rig, ros, scan, shift_scan, simulate, station, verify};
+use super::{
+    bench, board, calibrate, cell, demo, live, range, rig, ros, scan, scan_profiles, shift_scan, simulate, station,
+    verify,
+};
 use crate::fault::Result;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
@@ -34,10 +37,9 @@ struct Cli {
 }
 
 /// The commands in the groups of the help.
-const GROUPS: [(&str, &[&str]); 6] = [
-    ("Station", &["rig", "station", "verify", "doctor"]),
-    ("Calibration", &["board", "calibrate"]),
-    ("Scan", &["camera", "record", "live", "scan", "shift-scan", "filter", "range", "batch", "mcap"]),
+const GROUPS: [(&str, &[&str]); 5] = [
+    ("Station and calibration", &["rig", "station", "board", "calibrate", "verify", "doctor"]),
+    ("Scan", &["camera", "record", "live", "scan", "scan-profiles", "shift-scan", "filter", "range", "batch", "mcap"]),
     ("Find", &["teach", "model", "find", "second-look", "ghost", "match", "import-map"]),
     ("Robot", &["sweep", "job", "guide", "program", "robot"]),
     ("Simulation and measurement", &["demo", "simulate", "cell", "bench"]),
@@ -51,7 +53,7 @@ fn grouped() -> clap::Command {
         list += &format!("{title} commands:\n");
         for name in names {
             let about = command.find_subcommand(name).and_then(clap::Command::get_about);
-            list += &format!("  {name:12} {}\n", about.map(ToString::to_string).unwrap_or_default());
+            list += &format!("  {name:13} {}\n", about.map(ToString::to_string).unwrap_or_default());
         }
     }
     let template =
@@ -95,6 +97,7 @@ enum Command {
     #[command(subcommand)]
     Robot(robot::Command),
     Scan(scan::Args),
+    ScanProfiles(scan_profiles::Args),
     SecondLook(second_look::Args),
     ShiftScan(shift_scan::Args),
     /// Simulate a station with known truth: recordings, poses, true calibration
@@ -133,6 +136,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Rig(c) => rig::run(c, console),
         Command::Robot(c) => robot::run(c, console),
         Command::Scan(a) => scan::run(a, console),
+        Command::ScanProfiles(a) => scan_profiles::run(a, console),
         Command::SecondLook(a) => second_look::run(a, console),
         Command::ShiftScan(a) => shift_scan::run(a, console),
         Command::Simulate(a) => simulate::run(a, console),
@@ -249,7 +253,7 @@ mod tests {
         for line in help.lines() {
             assert!(line.chars().count() <= 100, "wraps: {line}");
         }
-        assert!(help.contains("\n  second-look  Plan a verification scan"), "{help}");
+        assert!(help.contains("\n  second-look   Plan a verification scan"), "{help}");
     }
 
     #[test]

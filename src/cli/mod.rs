@@ -17,6 +17,7 @@ mod range;
 mod rig;
 mod ros;
 mod scan;
+mod scan_profiles;
 mod shift_scan;
 mod simulate;
 mod station;

@@ -8,6 +8,7 @@ use super::motion::MOST;
 use crate::fault::{Fault, Result};
 use crate::files::{TableRow, table};
 use std::collections::BTreeSet;
+use std::path::Path;
 
 impl Recording {
     /// The axis' position at every frame, from the motion's zero; `None` if the count is unknown: it is never
@@ -23,8 +24,7 @@ impl Recording {
         let zero = motion.zero.unwrap_or(0.0);
         let counts: Vec<Option<f64>> = if let Some(name) = &motion.counts_file {
             let path = self.inside(name)?;
-            let text = crate::files::read_text(&path)?;
-            from_csv(&text, frames.len()).map_err(|e| e.at(path.display()))?
+            load_counts(&path, frames.len())?
         } else if let Some(step) = motion.counts_per_shot {
             let number = |(i, f): (usize, &FrameRef)| f.trigger.unwrap_or(i as u64) as f64;
             frames.iter().enumerate().map(|f| Some(number(f) * step)).collect()
@@ -33,6 +33,14 @@ impl Recording {
         };
         Ok(counts.into_iter().map(|c| c.map(|c| c - zero)).collect())
     }
+}
+
+/// The counts of a file with rows `frame,count`, one for each of `frames`; a frame without a row has none.
+///
+/// # Errors
+/// Another file, a frame twice or beyond the last.
+pub fn load_counts(path: &Path, frames: usize) -> Result<Vec<Option<f64>>> {
+    from_csv(&crate::files::read_text(path)?, frames).map_err(|e| e.at(path.display()))
 }
 
 /// Reads rows `frame,count`; frames without a row have no count.

@@ -10,6 +10,7 @@ mod meta;
 mod motion;
 mod pose_csv;
 mod poses;
+pub mod profiles;
 mod raw;
 mod readout;
 mod stand;
@@ -17,6 +18,7 @@ mod taken;
 
 pub use board::{BoardSpec, MarkerLayout, Markers, OriginMark, hexagonal_node};
 pub use board_poses::load_board_poses;
+pub use counts::load_counts;
 pub use frame::FrameRef;
 pub use frames::FollowedFrames;
 pub use meta::{AmbientRef, Beam, ImageSpec, Meta, Sources};

@@ -8,7 +8,7 @@ use super::{Calibration, HandEye, Joint, JointCovariance, Kind, Measured, Qualit
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::files::Together;
-use crate::geometry::{Axis, AxisKind, Base, Camera, Plane, Ray, Rigid};
+use crate::geometry::{Axis, AxisKind, Base, Camera, Flange, Plane, Ray, Rigid, Sensor};
 use serde::{Serialize, de::DeserializeOwned};
 use std::path::{Path, PathBuf};
 
@@ -29,6 +29,8 @@ pub struct Rig {
     pub linear_axis: Option<Calibration<Axis>>,
     /// Turntable that turns the parts before the camera.
     pub turntable: Option<Calibration<Axis>>,
+    /// Pose of a line-profile sensor on the flange.
+    pub profile_hand_eye: Option<Calibration<Rigid<Flange, Sensor>>>,
     /// Joint covariance of the records, if they were calibrated together.
     pub joint: Joint,
 }
@@ -70,6 +72,7 @@ impl Rig {
             base_camera: read(folder, Kind::BaseCamera)?,
             linear_axis: read(folder, Kind::LinearAxis)?,
             turntable: read(folder, Kind::Turntable)?,
+            profile_hand_eye: read(folder, Kind::ProfileHandEye)?,
             joint: Joint::default(),
         })
     }
@@ -129,6 +132,7 @@ impl Rig {
         add(&mut texts, &self.base_camera)?;
         add(&mut texts, &self.linear_axis)?;
         add(&mut texts, &self.turntable)?;
+        add(&mut texts, &self.profile_hand_eye)?;
         let folder = station.join("calibration");
         crate::files::make_folder(&folder)?;
         let set = together(&folder);
@@ -214,6 +218,10 @@ impl Rig {
         };
         self.belonging(axis)?.ok_or_else(|| missing(kind))
     }
+    /// Pose of a line-profile sensor on the flange; an error if it is missing.
+    pub fn need_profile_hand_eye(&self) -> Result<&Calibration<Rigid<Flange, Sensor>>> {
+        self.profile_hand_eye.as_ref().ok_or_else(|| missing(Kind::ProfileHandEye))
+    }
     /// The rig's axis, if it has one.
     ///
     /// # Errors
@@ -240,6 +248,7 @@ impl Rig {
             self.base_camera.as_ref().map(Record::of),
             self.linear_axis.as_ref().map(Record::of),
             self.turntable.as_ref().map(Record::of),
+            self.profile_hand_eye.as_ref().map(Record::of),
         ]
         .into_iter()
         .flatten()
@@ -270,11 +279,14 @@ impl Rig {
     }
 
     /// What the station lacks to scan, as a remark; `None` if it has a camera, a laser plane, and the camera's pose or
-    /// an axis.
+    /// an axis, or only a line-profile sensor.
     pub fn unfinished(&self) -> Option<String> {
         let there: Vec<Kind> = self.records().iter().map(|r| r.kind).collect();
         let posed = [Kind::HandEye, Kind::BaseCamera, Kind::LinearAxis, Kind::Turntable];
         let lacks = |kinds: &[Kind]| !kinds.iter().any(|k| there.contains(k));
+        if !lacks(&[Kind::ProfileHandEye]) && lacks(&[Kind::Camera, Kind::LaserPlane]) {
+            return None;
+        }
         let absent: Vec<&str> = [
             (lacks(&[Kind::Camera]), "camera"),
             (lacks(&[Kind::LaserPlane]), "laser plane"),
@@ -386,6 +398,7 @@ impl Rig {
             ("base_camera", self.base_camera.as_ref().map(|c| serde_json::json!(c.value))),
             ("linear_axis", self.linear_axis.as_ref().map(|c| serde_json::json!(c.value))),
             ("turntable", self.turntable.as_ref().map(|c| serde_json::json!(c.value))),
+            ("profile_hand_eye", self.profile_hand_eye.as_ref().map(|c| serde_json::json!(c.value))),
         ];
         for (name, value) in others.into_iter().filter_map(|(n, v)| Some((n, v?))) {
             values[name] = value;
@@ -448,10 +461,11 @@ fn again(kind: Kind) -> String {
 const NEVER_CALIBRATED: &str = "it was never calibrated, or another folder was given as --station";
 
 fn missing(kind: Kind) -> Fault {
-    Fault::input(format!("the station has no {} calibration", kind.words())).cause(NEVER_CALIBRATED).next(format!(
-        "run sheetlight calibrate {}, or import known values with sheetlight station import",
-        kind.command()
-    ))
+    // A profile sensor's pose is not among the values that are imported.
+    let or = if kind == Kind::ProfileHandEye { "" } else { ", or import known values with sheetlight station import" };
+    Fault::input(format!("the station has no {} calibration", kind.words()))
+        .cause(NEVER_CALIBRATED)
+        .next(format!("run sheetlight calibrate {}{or}", kind.command()))
 }
 
 fn file(station: &Path, kind: Kind) -> PathBuf {

@@ -73,7 +73,7 @@ const POSE: [&str; 6] = ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"
 
 impl Kind {
     /// The kinds that a station's scans and ranges use.
-    pub const OF_A_RIG: [Kind; 7] = [
+    pub const OF_A_RIG: [Kind; 8] = [
         Kind::Camera,
         Kind::LaserPlane,
         Kind::Pointer,
@@ -81,6 +81,7 @@ impl Kind {
         Kind::BaseCamera,
         Kind::LinearAxis,
         Kind::Turntable,
+        Kind::ProfileHandEye,
     ];
 
     /// Name in files and in file names.
@@ -97,7 +98,7 @@ impl Kind {
     }
     /// Name in messages.
     pub fn words(self) -> String {
-        if self == Kind::HandEye { "hand-eye".into() } else { self.name().replace('_', " ") }
+        self.name().replace('_', " ").replace("hand eye", "hand-eye")
     }
     /// The frame of such a value, or the transform between two frames that it is.
     pub fn place(self) -> Place {

@@ -201,7 +201,7 @@ impl<'a> Input<'a> {
             ("scan_created", r.created.clone()),
             ("recording", r.recording.clone()),
             ("frame", e.frames.name(&r.frame).to_owned()),
-            ("units", "m; u and v in px".to_owned()),
+            ("units", if r.profiles.is_some() { "m; u in places of a profile" } else { "m; u and v in px" }.to_owned()),
             ("times", self.clock.source.to_string()),
             ("times_from", self.clock.words.clone()),
             ("rig_fingerprint", r.rig_fingerprint.clone()),
@@ -228,6 +228,7 @@ impl<'a> Input<'a> {
         let Some(rig) = &self.rig else { return links };
         let reported = frames.name("camera_reported");
         links.extend(rig.hand_eye.as_ref().map(|c| Link::new(frames.name("flange"), reported, &c.value)));
+        links.extend(rig.profile_hand_eye.as_ref().map(|c| Link::new(frames.name("flange"), reported, &c.value)));
         links.extend(rig.base_camera.as_ref().map(|c| Link::new(frames.name("base"), reported, &c.value)));
         links
     }

@@ -46,6 +46,9 @@ impl<'a> Recorded<'a> {
         if report.imported.is_some() {
             return Err(other("the scan was imported and has no recording".into()));
         }
+        if report.profiles.is_some() {
+            return Err(other("the scan was made of profiles, not of pictures".into()));
+        }
         let bracket = meta.bracket()?;
         if bracket.is_some() && report.exposures.is_none() {
             return Err(other("its poses have several exposures, the scan is of one of them alone".into()));

@@ -64,8 +64,14 @@ pub fn parts_for(rig: &Rig, motion: &Motion) -> Rig {
         linear_axis: rig.linear_axis.clone().filter(|_| motion.axis() == Some(AxisKind::Linear)),
         turntable: rig.turntable.clone().filter(|_| motion.axis() == Some(AxisKind::Turntable)),
         pointer: None,
+        profile_hand_eye: None,
         ..rig.clone()
     }
+}
+
+/// The parts of a rig that a scan from profiles of a line-profile sensor on the flange depends on.
+pub fn parts_for_profiles(rig: &Rig) -> Rig {
+    Rig { profile_hand_eye: rig.profile_hand_eye.clone(), ..Rig::default() }
 }
 
 /// The calibrations that a scan with this motion needs.

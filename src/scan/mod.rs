@@ -24,7 +24,7 @@ mod source;
 pub use crate::capture::{Format, Pictures, RawFormat, RawFrames};
 pub use ambient::Ambient;
 pub use captured::{RecordedSource, Say, StreamSource};
-pub use carrier::{Carrier, Place, needs, parts_for};
+pub use carrier::{Carrier, Place, needs, parts_for, parts_for_profiles};
 pub use cloud::{CloudFile, CloudPoint, CloudWriter, PointSource, read_cloud, write_cloud};
 pub use engine::{Engine, Measured, Optical, StripeSeen};
 pub use extraction::Extraction;

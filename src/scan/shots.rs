@@ -174,7 +174,7 @@ struct Head {
     stripe_along: Along,
     /// Fingerprint of the rig that the points were made with.
     rig: String,
-    /// The rig's laser plane, camera frame; older versions did not write it.
+    /// The rig's laser plane, camera frame; older versions did not write it, and profiles of a sensor have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     sheet: Option<Plane<Camera>>,
 }
@@ -200,15 +200,21 @@ pub struct ShotsWriter {
 
 impl ShotsWriter {
     /// Starts a list; an existing one of that name is discarded. `frame` is the cloud's, `rig` the rig's
-    /// fingerprint.
-    pub fn create(folder: &Path, frame: &str, along: Along, rig: &str, sheet: &Plane<Camera>) -> Result<ShotsWriter> {
+    /// fingerprint, `sheet` its laser plane; profiles of a sensor have none.
+    pub fn create(
+        folder: &Path,
+        frame: &str,
+        along: Along,
+        rig: &str,
+        sheet: Option<&Plane<Camera>>,
+    ) -> Result<ShotsWriter> {
         let head = Head {
             format: FORMAT.into(),
             frame: frame.into(),
             units: UNITS.into(),
             stripe_along: along,
             rig: rig.into(),
-            sheet: Some(*sheet),
+            sheet: sheet.copied(),
         };
         ShotsWriter::with(folder, &line(&head))
     }
@@ -272,7 +278,7 @@ mod tests {
     fn what_is_written_is_read_and_a_cut_off_list_goes_on() {
         let dir = tempfile::tempdir().unwrap();
         let sheet = Plane::new(Vec3::new(0.0, 0.6, 0.8), 72.5).unwrap();
-        let mut w = ShotsWriter::create(dir.path(), "base", Along::V, "rig", &sheet).unwrap();
+        let mut w = ShotsWriter::create(dir.path(), "base", Along::V, "rig", Some(&sheet)).unwrap();
         (0..5).for_each(|s| w.add(s, place(s)));
         w.checkpoint().unwrap();
         w.add(5, place(5));
@@ -299,7 +305,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join(SHOTS_FILE);
         let sheet = Plane::new(Vec3::z(), 100.0).unwrap();
-        let mut w = ShotsWriter::create(dir.path(), "base", Along::U, "rig", &sheet).unwrap();
+        let mut w = ShotsWriter::create(dir.path(), "base", Along::U, "rig", Some(&sheet)).unwrap();
         w.add(0, place(0));
         w.checkpoint().unwrap();
         let text = std::fs::read_to_string(&path).unwrap();

@@ -14,7 +14,7 @@ use crate::geometry::{AxisKind, Base, Flange, Rigid, Vec3};
 use crate::raster::RgbImage;
 use crate::recording::Recording;
 use crate::rig::Rig;
-use crate::scan::{CloudPoint, GridOptions, Shots, grid, parts_for};
+use crate::scan::{CloudPoint, GridOptions, Shots, grid};
 use std::path::{Path, PathBuf};
 
 /// The data of one part: finished scans of it, and pictures of the pointer's spot on it.
@@ -107,14 +107,15 @@ pub fn second_look(
     turn_deg: f64,
     tilt_deg: f64,
 ) -> Result<SecondLook> {
-    let motion = load_report(scan)?.motion;
+    let scanned = load_report(scan)?;
+    let motion = &scanned.motion;
     if motion.frame() != "base" {
         return Err(Fault::usage(format!("{}: was scanned in the {} frame", scan.display(), motion.frame()))
             .cause("no robot moved the sensor, so no second scan can be planned")
             .next("scan the part again in another position on the axis"));
     }
     let (report, _) = find_part(scan, recipe, Some(station), &LocateOptions::default())?;
-    let plan = plan_look(&report, &parts_for(&Rig::load(station)?, &motion), turn_deg, tilt_deg)?;
+    let plan = plan_look(&report, &scanned.parts_of(&Rig::load(station)?), turn_deg, tilt_deg)?;
     let flanges = poses.iter().map(|p| plan.base_from_base * *p).collect();
     Ok(SecondLook { report, plan, flanges })
 }
@@ -180,7 +181,7 @@ pub fn find_part_held(
 ) -> Result<(Report, RgbImage)> {
     let scanned = &held.report;
     scanned.has_points()?;
-    let rig = rig.map(|rig| parts_for(rig, &scanned.motion));
+    let rig = rig.map(|rig| scanned.parts_of(rig));
     if let Some(rig) = &rig {
         rig.belong_together()?;
         fits(rig, Path::new("the scan"), scanned)?;
@@ -220,7 +221,7 @@ fn located(
 /// # Errors
 /// Calibrations that do not belong together, or differ from those with which the scan was made.
 pub fn rig_that_scanned(station: &Path, scan: &Path, scanned: &ScanReport) -> Result<Rig> {
-    let rig = parts_for(&Rig::load(station)?, &scanned.motion);
+    let rig = scanned.parts_of(&Rig::load(station)?);
     rig.belong_together().map_err(|e| e.at(station.display()))?;
     fits(&rig, scan, scanned)?;
     Ok(rig)

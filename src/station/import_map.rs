@@ -114,6 +114,7 @@ fn report(made: Lines, points: u64, imported: Imported) -> ScanReport {
         remarks: made.notes.into_iter().chain([NO_BUDGET.to_owned()]).collect(),
         files: BTreeMap::new(),
         imported: Some(imported),
+        profiles: None,
         filtered: None,
     }
 }

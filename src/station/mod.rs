@@ -17,6 +17,7 @@ mod output;
 mod range;
 mod robot;
 mod scan;
+mod scan_profiles;
 mod settings;
 pub mod socket;
 mod values;
@@ -71,12 +72,14 @@ pub use scan::options::ScanOptions;
 pub use scan::progress::Checkpoint;
 pub use scan::recorded::scan_recording;
 pub use scan::report::{
-    Filtered, HeightMapFigures, Imported, ScanReport, Spent, cloud_of, lit_cloud_of, load_report, shots_of, whole_scan,
+    Filtered, HeightMapFigures, Imported, Profiled, ScanReport, Spent, cloud_of, lit_cloud_of, load_report, shots_of,
+    whole_scan,
 };
 pub use scan::run::{scan, scan_on};
 pub use scan::scan_folder::of_a_scan;
 pub use scan::seen::Seen;
 pub use scan::watch::Watch;
+pub use scan_profiles::{Moved, ProfileScan, scan_profiles};
 pub use settings::{HeadSpec, Settings, ToolSpec, WorkingVolume};
 pub use values::{PlaneValue, Sigmas, Values, ValuesFormat, written_camera};
 pub use verify::{CalibrationCheck, VerifyReport, VerifyRun, verify};

@@ -10,7 +10,6 @@ use crate::find::look::register::{Registered, register};
 use crate::find::measure::points::Ordered;
 use crate::geometry::Vec3;
 use crate::rig::{Calibration, Rig};
-use crate::scan::parts_for;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -96,6 +95,7 @@ pub fn verify(rig: &Rig, run: &VerifyRun) -> Result<VerifyReport> {
     add("base camera", rig.base_camera.as_ref().map(check));
     add("linear axis", rig.linear_axis.as_ref().map(check));
     add("turntable", rig.turntable.as_ref().map(check));
+    add("profile hand-eye", rig.profile_hand_eye.as_ref().map(check));
     if calibrations.is_empty() {
         return Err(Fault::input("the station has no calibration")
             .cause("another folder was given as --station")
@@ -143,7 +143,7 @@ fn object(rig: &Rig, folders: &[PathBuf]) -> Result<ObjectCheck> {
     let mut rig = rig.clone();
     for folder in folders {
         let report = super::load_report(folder)?;
-        rig = parts_for(&rig, &report.motion);
+        rig = report.parts_of(&rig);
         fits(&rig, folder, &report)?;
         let points = Ordered::new(&super::lit_cloud_of(folder)?, &super::shots_of(folder)?)
             .map_err(|e| e.at(folder.display()))?;

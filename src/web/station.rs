@@ -50,7 +50,11 @@ pub fn age(rig: &Rig) -> Option<CalibrationAge> {
     let joint = rig.joint().and_then(std::result::Result::err).map(|_| (Verdict::Usable, JOINT.to_owned()));
     let (verdict, worst) = verdicts.chain(joint).reduce(|a, b| if b.0 > a.0 { b } else { a })?;
     let all = calibrations(rig);
-    let scanning: Vec<_> = all.iter().filter(|c| c.kind != Kind::Pointer.name()).map(|c| c.expected_mm).collect();
+    let scanning: Vec<_> = all
+        .iter()
+        .filter(|c| c.kind != Kind::Pointer.name() && c.kind != Kind::ProfileHandEye.name())
+        .map(|c| c.expected_mm)
+        .collect();
     let known: Option<Vec<f64>> = scanning.into_iter().collect();
     let expected = known.map(|mm| mm.iter().map(|v| v * v).sum::<f64>().sqrt());
     let days = all.iter().map(|c| c.days).fold(0.0, f64::max);
@@ -128,7 +132,7 @@ pub(super) fn flatten(before: &str, value: &Value, out: &mut BTreeMap<String, Va
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Axis, AxisKind, Base, Camera, CountUnit, Rigid};
+    use crate::geometry::{Axis, AxisKind, Base, Camera, CountUnit, Flange, Rigid, Sensor};
     use crate::rig::{Calibration, Covariance, Joint, JointCovariance};
     use crate::simulate::Station;
     use std::collections::BTreeMap;
@@ -163,6 +167,9 @@ mod tests {
                 AxisKind::Turntable => r.turntable = Some(record.clone()),
             });
         }
+        let at = Rigid::<Flange, Sensor>::identity();
+        let sensor = Calibration::new(Kind::ProfileHandEye, at, None, Covariance::default(), quality(verdict));
+        add(Kind::ProfileHandEye, &|r| r.profile_hand_eye = Some(sensor.clone()));
         all
     }
 

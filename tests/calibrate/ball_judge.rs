@@ -9,9 +9,9 @@ use rand_pcg::Pcg64;
 use sheetlight::calibrate::ball::evaluate::evaluate;
 use sheetlight::calibrate::ball::options::BallOptions;
 use sheetlight::calibrate::ball::options::Side;
-use sheetlight::calibrate::ball::profile::Profile;
 use sheetlight::calibrate::ball::solve::{BallFit, solve};
 use sheetlight::geometry::{Base, Flange, Mat3, Rigid, Sensor, Vec3, exp, log};
+use sheetlight::recording::profiles::Profile;
 
 const RADIUS: f64 = 20.0;
 

@@ -18,6 +18,7 @@ mod golden;
 mod inputs;
 mod live;
 mod masks;
+mod profiles;
 mod readout;
 mod resume;
 mod round_parts;

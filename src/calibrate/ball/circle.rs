@@ -2,9 +2,9 @@
 //! Frame and unit: the sensor's plane y = 0, mm; docs/math.md, Ball (2).
 
 use super::options::BallOptions;
-use super::profile::Profile;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Mat3, Vec3};
+use crate::recording::profiles::Profile;
 use crate::solve::{ConsensusOptions, LmOptions, Loss, Problem, Residuals, consensus, lm};
 
 /// A profile as a measurement: centre x, z and radius of the circle. The information matrix holds for a point

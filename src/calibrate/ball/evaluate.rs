@@ -4,9 +4,9 @@
 
 use super::circle::circle;
 use super::options::BallOptions;
-use super::profile::Profile;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Mat3, Rigid, Sensor, Vec3};
+use crate::recording::profiles::Profile;
 use crate::solve::{LmOptions, Loss, Problem, Residuals, lm};
 
 /// What [`evaluate`] found.

@@ -5,7 +5,4 @@ mod circle;
 pub mod evaluate;
 pub mod missing;
 pub mod options;
-pub mod profile;
-pub mod profiles;
-mod sequences;
 pub mod solve;

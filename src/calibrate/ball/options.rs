@@ -1,6 +1,7 @@
 //! In: a user's settings for the ball calibration. Out: the checked settings.
 //! Frame and unit: mm.
 
+use super::missing::Heights;
 use crate::fault::{Fault, Result};
 
 /// On which side of the profile plane (y = 0 of the sensor) the ball's centre lies.
@@ -41,8 +42,8 @@ pub struct BallOptions {
     pub min_profiles: usize,
     /// Random seed; the same seed gives the same result.
     pub seed: u64,
-    /// The z that stands for a point without a measurement, mm.
-    pub missing: Option<f64>,
+    /// What is stated about z.
+    pub heights: Heights,
 }
 
 impl BallOptions {
@@ -56,7 +57,7 @@ impl BallOptions {
             clear: 25.0,
             min_profiles: 8,
             seed: 1,
-            missing: None,
+            heights: Heights::default(),
         }
     }
     /// Refuses values outside the ranges stated at the fields.

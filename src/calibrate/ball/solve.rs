@@ -4,10 +4,10 @@
 
 use super::circle::{Circle, circle};
 use super::options::{BallOptions, Side};
-use super::profile::Profile;
 use crate::calibrate::components::Components;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, LeftStep, Mat3, Rigid, Sensor, Vec3, orthonormalise, skew};
+use crate::recording::profiles::Profile;
 use crate::solve::{End, LmOptions, Loss, Problem, Residuals, lm};
 use nalgebra::{DMatrix, DVector, SMatrix};
 

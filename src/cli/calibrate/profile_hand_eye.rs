@@ -2,6 +2,7 @@
 //! Frame and unit: flange_T_sensor; mm, degrees.
 
 use super::store::{Keep, finish};
+use crate::calibrate::ball::missing::Heights;
 use crate::calibrate::ball::options::{BallOptions, Side};
 use crate::calibrate::limits::Asked;
 use crate::cli::terminal::console::Console;
@@ -38,6 +39,9 @@ pub struct Args {
     /// z that means "not measured", mm; values that are not finite are always skipped
     #[arg(long, value_name = "Z", allow_negative_numbers = true)]
     missing: Option<f64>,
+    /// z of the profiles grows towards the sensor: it is negated; scan-profiles needs the same
+    #[arg(long)]
+    z_up: bool,
     /// Station folder for the result
     #[arg(long, required_unless_present = "evaluate")]
     station: Option<PathBuf>,
@@ -52,7 +56,8 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    let options = BallOptions { side: args.side, missing: args.missing, ..BallOptions::new(args.ball_diameter_mm) };
+    let heights = Heights { missing: args.missing, up: args.z_up };
+    let options = BallOptions { side: args.side, heights, ..BallOptions::new(args.ball_diameter_mm) };
     if let Some(transform) = &args.evaluate {
         return put_to_the_test(args, transform, &options, console);
     }

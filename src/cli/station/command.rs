@@ -9,7 +9,7 @@ use crate::cli::terminal::console::Console;
 use crate::cli::terminal::outputs;
 use crate::cli::terminal::outputs::Inputs;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Axis, AxisKind, Base, Camera, Plane, Ray, Rigid};
+use crate::geometry::{Axis, AxisKind, Base, Camera, Flange, Plane, Ray, Rigid, Sensor};
 use crate::rig::{Calibration, HandEye, Kind, Rig};
 use crate::robot::Convention;
 use crate::station::{Settings, Sigmas, Values, ValuesFormat, written_camera};
@@ -201,7 +201,8 @@ fn seal(a: &Seal, console: &Console) -> Result<()> {
         Kind::Pointer => Rig::vouch::<Ray<Camera>>,
         Kind::BaseCamera => Rig::vouch::<Rigid<Base, Camera>>,
         Kind::LinearAxis | Kind::Turntable => Rig::vouch::<Axis>,
-        _ => Rig::vouch::<HandEye>,
+        Kind::ProfileHandEye => Rig::vouch::<Rigid<Flange, Sensor>>,
+        Kind::HandEye => Rig::vouch::<HandEye>,
     };
     if a.because.trim().is_empty() {
         return Err(Fault::usage("--because says nothing").next("give the reason to trust the file"));

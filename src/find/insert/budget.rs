@@ -4,7 +4,7 @@
 
 use super::recipe::Recipe;
 use crate::fault::Result;
-use crate::find::look::levers::{AXIS, HAND_EYE, Lever, TOGETHER};
+use crate::find::look::levers::{AXIS, HAND_EYE, Lever, PROFILE_HAND_EYE, TOGETHER};
 use crate::find::look::part_seen::PartSeen;
 use crate::find::measure::construct::Built;
 use crate::find::measure::points::Ordered;
@@ -110,15 +110,21 @@ pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, recipe: 
     let into_part = both(&measured.base_from_part.rotation.transpose());
     let (together, aside) =
         seen.as_ref().zip(rig).filter(|_| !on_axis).map_or((None, None), |(seen, rig)| at_once(seen, rig));
-    let carrying = if on_axis { AXIS } else { HAND_EYE };
-    for name in ["laser plane", carrying] {
+    let on_profiles = rig.is_some_and(|rig| rig.profile_hand_eye.is_some());
+    let (names, eye): (&[&'static str], &str) = match () {
+        () if on_profiles => (&[PROFILE_HAND_EYE], "sensor"),
+        () if rig.is_some_and(|rig| rig.records().is_empty()) => (&[TRAVEL], "sensor"),
+        () if on_axis => (&["laser plane", AXIS], "camera"),
+        () => (&["laser plane", HAND_EYE], "camera"),
+    };
+    for &name in names {
         let known = levers.iter().find(|l| l.name == name);
         match (known.filter(|l| l.covariance.is_some()), &seen) {
             (Some(lever), Some(seen)) => {
                 let c = lever.of_pose();
                 let shift = c.fixed_view::<3, 3>(0, 0).trace().max(0.0).sqrt();
                 let c = into_part * c * into_part.transpose();
-                let mut note = format!("{shift:.4} mm at {:.0} mm from the camera", seen.target().norm());
+                let mut note = format!("{shift:.4} mm at {:.0} mm from the {eye}", seen.target().norm());
                 if together.is_some() {
                     note += &format!("; contained in '{TOGETHER}'");
                 } else {
@@ -129,7 +135,12 @@ pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, recipe: 
             }
             _ => {
                 complete = false;
-                let note = if known.is_some() { NO_COVARIANCE } else { NO_GEOMETRY }.into();
+                let note = match known {
+                    Some(_) => NO_COVARIANCE,
+                    None if name == TRAVEL => "unknown: the way of a count was stated without an uncertainty",
+                    None => NO_GEOMETRY,
+                };
+                let note = note.into();
                 terms.push(Term { name, sigma_mm: None, sigma_deg: None, note });
             }
         }
@@ -191,5 +202,7 @@ pub(in crate::find) fn both(r: &Mat3) -> Matrix6<f64> {
     out
 }
 
+/// Name of the term of an axis that no calibration describes.
+const TRAVEL: &str = "travel";
 const NO_GEOMETRY: &str = "unknown: the scan does not fit the station's calibration, or none was given";
 const NO_COVARIANCE: &str = "unknown: the calibration has no covariance (imported values)";

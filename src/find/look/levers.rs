@@ -18,6 +18,8 @@ pub type Answer = SVector<f64, NUMBERS>;
 
 /// Name of the lever of the hand-eye calibration.
 pub const HAND_EYE: &str = "hand-eye";
+/// Name of the lever of a line-profile sensor's hand-eye calibration.
+pub const PROFILE_HAND_EYE: &str = "profile hand-eye";
 /// Name of the lever of calibrations that were made jointly.
 pub const TOGETHER: &str = "calibrations together";
 /// Name of the lever of a linear axis or a turntable.
@@ -87,9 +89,15 @@ pub fn levers(seen: &[Seen], rig: &Rig, answer: impl Fn(&[Vec3]) -> Answer) -> R
         let of = lever("laser plane", &["nx", "ny", "nz", "offset mm"], &|s, k| by_plane(s, &p.value, k));
         out.push(Lever { covariance: square(&p.covariance, 4), ..of });
     }
+    let names: &'static [&'static str] = &["tx mm", "ty mm", "tz mm", "rx rad", "ry rad", "rz rad"];
     if let Some(h) = &rig.hand_eye {
-        let names = &["tx mm", "ty mm", "tz mm", "rx rad", "ry rad", "rz rad"];
         let of = lever(HAND_EYE, names, &|s, k| by_hand_eye(s, &h.value, k));
+        out.push(Lever { covariance: square(&h.covariance, 6), ..of });
+    }
+    if let Some(h) = &rig.profile_hand_eye {
+        // The sensor's frame takes the place of the camera's.
+        let placed = HandEye::new(h.value.rotation, h.value.translation);
+        let of = lever(PROFILE_HAND_EYE, names, &|s, k| by_hand_eye(s, &placed, k));
         out.push(Lever { covariance: square(&h.covariance, 6), ..of });
     }
     if let Some(a) = rig.axis()? {

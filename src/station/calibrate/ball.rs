@@ -6,7 +6,6 @@ use super::hand_eye::Calibrated;
 use crate::calibrate::ball::evaluate::{Evaluation, evaluate};
 use crate::calibrate::ball::missing::{Cleaned, cleaned};
 use crate::calibrate::ball::options::BallOptions;
-use crate::calibrate::ball::profiles::load;
 use crate::calibrate::ball::solve::{BallFit, solve};
 use crate::calibrate::hand_eye::report::HAND_EYE_NAMES;
 use crate::calibrate::limits::{Asked, Limits, rms};
@@ -14,7 +13,8 @@ use crate::calibrate::report::{Page, bars};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid, Sensor, Vec3, skew};
 use crate::recording::load_poses;
-use crate::rig::{Calibration, Covariance, Kind, Quality, Verdict, Volume, hash_file};
+use crate::recording::profiles::{files_of, load};
+use crate::rig::{Calibration, Covariance, Kind, Quality, Verdict, Volume};
 use crate::robot::fanuc_tp;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -28,7 +28,7 @@ pub fn calibrate_profile_hand_eye(
     asked: &Asked,
 ) -> Result<(Calibrated<Rigid<Flange, Sensor>>, Vec<String>)> {
     asked.check()?;
-    let Cleaned { profiles: all, suspects, warnings: strange } = cleaned(load(profiles)?, options.missing);
+    let Cleaned { profiles: all, suspects, warnings: strange } = cleaned(load(profiles)?, options.heights);
     let (read, mut warnings) = poses_of(poses)?;
     warnings.extend(strange);
     let fit = solve(&all, &read, options)?;
@@ -47,14 +47,8 @@ pub fn calibrate_profile_hand_eye(
         quality,
     )
     .with_input(poses)?;
-    if profiles.is_dir() {
-        let entries = std::fs::read_dir(profiles).map_err(|e| Fault::read(profiles, e))?;
-        for path in entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| p.is_file()) {
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            calibration.inputs.insert(name, hash_file(&path)?);
-        }
-    } else {
-        calibration = calibration.with_input(profiles)?;
+    for path in files_of(profiles)? {
+        calibration = calibration.with_input(&path)?;
     }
     Ok((Calibrated { calibration, page, missing: Vec::new() }, warnings))
 }
@@ -68,7 +62,7 @@ pub fn evaluate_profile_hand_eye(
 ) -> Result<(Evaluation, Vec<String>)> {
     let sensor = sensor_of(transform)?;
     let (read, mut warnings) = poses_of(poses)?;
-    let cleaned = cleaned(load(profiles)?, options.missing);
+    let cleaned = cleaned(load(profiles)?, options.heights);
     warnings.extend(cleaned.warnings);
     Ok((evaluate(&cleaned.profiles, &read, &sensor, options)?, warnings))
 }
@@ -94,10 +88,18 @@ fn sensor_of(path: &Path) -> Result<Rigid<Flange, Sensor>> {
     Rigid::from_rows(&rows).map(|(pose, _)| pose).map_err(|e| e.at(path.display()))
 }
 
+/// Poses of a recording's file or of a FANUC listing. Also returns warnings in words.
 fn poses_of(path: &Path) -> Result<(Vec<Rigid<Base, Flange>>, Vec<String>)> {
+    let (poses, _, warnings) = listed_poses(path)?;
+    Ok((poses, warnings))
+}
+
+/// Poses of a recording's file or of a FANUC listing; the number of the listing's user frame, 0 for the base. Also
+/// returns warnings in words.
+pub(in crate::station) fn listed_poses(path: &Path) -> Result<(Vec<Rigid<Base, Flange>>, u32, Vec<String>)> {
     let listing = path.extension().is_some_and(|e| ["ls", "tp"].iter().any(|k| e.eq_ignore_ascii_case(k)));
     if !listing {
-        return load_poses(path).map(|f| (f.poses, f.warnings));
+        return load_poses(path).map(|f| (f.poses, 0, f.warnings));
     }
     let text = crate::files::read_text(path)?;
     let read = fanuc_tp::read::<Base, Flange>(&text).map_err(|e| e.at(path.display()))?;
@@ -109,7 +111,7 @@ fn poses_of(path: &Path) -> Result<(Vec<Rigid<Base, Flange>>, Vec<String>)> {
              tool frame; it is the flange's only if UT {ut} is zero"
         ));
     }
-    Ok((read.into_iter().map(|p| p.pose).collect(), warnings))
+    Ok((read.into_iter().map(|p| p.pose).collect(), uf, warnings))
 }
 
 fn expected(fit: &BallFit, distance: f64) -> f64 {

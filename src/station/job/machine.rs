@@ -19,7 +19,7 @@ use crate::geometry::{Base, Flange, Rigid, Vec3};
 use crate::recording::Beam;
 use crate::rig::{Rig, hash_file, hash_text};
 use crate::robot::Convention;
-use crate::scan::Where;
+use crate::scan::{Where, parts_for};
 use crate::station::scan::options::ScanOptions;
 use crate::station::scan::recorded::scan_recording;
 use crate::station::scan::report::{lit_cloud_of, load_report, shots_of};
@@ -104,7 +104,14 @@ impl<'a> Job<'a> {
                 .next("write [tool] with flange_from_tool = [16 numbers] (docs/robots.md)"));
         }
         crate::files::make_folder(&options.out)?;
-        let made_from = hash_text(format!("{} {}", hash_file(&options.recipe)?, rig.fingerprint()).as_bytes());
+        let made_from = hash_text(
+            format!(
+                "{} {}",
+                hash_file(&options.recipe)?,
+                parts_for(&rig, &crate::recording::Motion::default()).fingerprint()
+            )
+            .as_bytes(),
+        );
         let state = match JobState::load(&options.out)? {
             Some(state) => {
                 state.goes_on_with(&made_from).map_err(|e| e.at(options.out.display()))?;
@@ -391,7 +398,7 @@ impl<'a> Job<'a> {
         }
         Ok(Evidence {
             normal: self.state.surface.map(|s| s[1]),
-            fingerprints: Some((self.rig.fingerprint(), scan.rig_fingerprint)),
+            fingerprints: Some((scan.parts_of(&self.rig).fingerprint(), scan.rig_fingerprint)),
             scan_age_s: Some(self.state.scanned_at.map_or(f64::NAN, |t| now_s() - t)),
             measured,
         })

@@ -54,7 +54,10 @@ fn timed(r: &ScanReport) -> bool {
 }
 
 fn head(r: &ScanReport, judged: Option<&Judged>) -> Markup {
-    let size = format!("shots of {}×{}, full resolution", r.image.width, r.image.height);
+    let size = match r.profiles {
+        Some(_) => format!("profiles of up to {} places", r.image.width),
+        None => format!("shots of {}×{}, full resolution", r.image.width, r.image.height),
+    };
     let mut cards = vec![(thousands(r.points), "points"), (r.shots.to_string(), &size)];
     if let Some(sigma) = r.median_sigma_mm {
         cards.push((format!("{sigma:.3} mm"), "standard deviation of a point (median, as stated by the scan)"));
@@ -225,21 +228,21 @@ fn shots(scan: &Path) -> Result<Markup> {
 }
 
 fn peaks(r: &ScanReport) -> Markup {
-    let all: u64 = r.peaks.values().sum();
+    let (all, of_profiles): (u64, bool) = (r.peaks.values().sum(), r.profiles.is_some());
     let mut rows: Vec<_> = r.peaks.iter().collect();
     rows.sort_by_key(|(_, n)| std::cmp::Reverse(**n));
     html! {
         section {
-            h2 { "What became of the peaks" }
+            h2 { @if of_profiles { "Places of the profiles" } @else { "What became of the peaks" } }
             table {
-                tr { th { "result" } th { "peaks" } th { "share" } }
+                tr { th { "result" } th { @if of_profiles { "places" } @else { "peaks" } } th { "share" } }
                 @for (fate, &n) in rows {
                     tr { td { (fate) } td { (thousands(n)) } td { (format!("{:.3} \
                         %", 100.0 * n as f64 / all.max(1) as f64)) } }
                 }
             }
-            p { (r.seen.words()) "." }
-            @if !r.dark_shots.is_empty() { p { (r.dark_shots.len()) " shots without a stripe." } }
+            @if !of_profiles { p { (r.seen.words()) "." } }
+            @if !r.dark_shots.is_empty() { p { (r.dark_shots.len()) " shots without a point." } }
             @for remark in &r.remarks { p { "Note: " (remark) } }
             @for (name, why) in &r.skipped { p { "Excluded " (name) ": " (why) } }
         }
@@ -250,10 +253,11 @@ fn machine(r: &ScanReport) -> Markup {
     let print: String = r.rig_fingerprint.chars().take(16).collect();
     let time = format!("{:.2} s, {:.1} shots/s", r.seconds, r.shots_per_second);
     let mut rows = if timed(r) { vec![("ran on", r.ran_on.clone()), ("time", time)] } else { Vec::new() };
-    rows.extend([
-        ("pictures", format!("{}×{}, {} bits", r.image.width, r.image.height, r.image.bits)),
-        ("calibration", format!("rig {print}")),
-    ]);
+    rows.push(match &r.profiles {
+        Some(p) => ("sensor", format!("standard deviation along z, as stated: {} mm", p.sigma_mm)),
+        None => ("pictures", format!("{}×{}, {} bits", r.image.width, r.image.height, r.image.bits)),
+    });
+    rows.push(("calibration", format!("rig {print}")));
     if let Some(p) = &r.places {
         rows.push(("reported places", p.to_string()));
     }

@@ -80,6 +80,7 @@ impl Done<'_> {
                 .collect(),
             files,
             imported: None,
+            profiles: None,
             filtered: None,
         }
     }

@@ -8,7 +8,7 @@ mod overlays;
 pub(super) mod products;
 pub mod progress;
 pub(super) mod recorded;
-mod refined;
+pub(super) mod refined;
 pub(super) mod report;
 pub(super) mod run;
 pub(super) mod scan_folder;

@@ -15,7 +15,7 @@ const NEXT: &str = "refined.ply";
 
 /// What the scan showed and the correction removed; `None` if nothing was found.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Refined {
+pub(in crate::station) struct Refined {
     pub places: Option<PathFound>,
     pub sheet: Option<SheetFound>,
     /// Median of the points' corrected standard deviations, mm; `None` if they were not changed.
@@ -23,7 +23,7 @@ pub(super) struct Refined {
 }
 
 /// `part`: the working folder; `frame`: the cloud's frame; `shots`: the shots at their reported poses.
-pub(super) fn refine(
+pub(in crate::station) fn refine(
     part: &Path,
     frame: &'static str,
     shots: Shots,

@@ -6,10 +6,10 @@ use super::seen::Seen;
 use crate::capture::{Account, Delay};
 use crate::fault::{Fault, Result};
 use crate::recording::Motion;
-use crate::rig::{Volume, hash_file};
+use crate::rig::{Rig, Volume, hash_file};
 use crate::scan::{
     Along, CloudFile, CloudPoint, Extraction, Filter, Format, Merged, PathFound, SHOTS_FILE, SheetFound, Shots,
-    read_cloud,
+    parts_for, parts_for_profiles, read_cloud,
 };
 use crate::stages::peak::Stripe;
 use rayon::prelude::*;
@@ -95,9 +95,35 @@ pub struct ScanReport {
     /// Origin of points that no rig of this program measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub imported: Option<Imported>,
+    /// Statements about the line-profile sensor whose profiles the shots are; `None` for shots that are pictures.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profiles: Option<Profiled>,
     /// What was removed from an earlier scan by filters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub filtered: Option<Filtered>,
+}
+
+/// The profiles that a scan was made of, and what their user stated about them.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Profiled {
+    /// Name of the file of poses, or of counts.
+    pub moved: String,
+    /// Way of the parts during one count, as stated, sensor frame, mm; `None` if a robot moved the sensor.
+    pub travel_mm: Option<[f64; 3]>,
+    /// SHA-256 of the files of profiles and of poses or counts, by name.
+    pub inputs: BTreeMap<String, String>,
+    /// Standard deviation of a point along z of the sensor, as stated, mm.
+    pub sigma_mm: f64,
+    /// The same along x of the sensor, as stated; `None` if it was not stated: it then counts as 0.
+    pub sigma_x_mm: Option<f64>,
+    /// z that means "not measured", as stated, mm.
+    pub missing: Option<f64>,
+    /// Whether z grows towards the sensor, as stated; it was negated.
+    pub z_up: bool,
+    /// mm of x to one step of `u`, if places that were not measured are not in the file; `None` if `u` is the index
+    /// of a place in its profile.
+    pub step_mm: Option<f64>,
 }
 
 /// The scan that was filtered, and the filters.
@@ -186,6 +212,15 @@ pub struct HeightMapFigures {
 }
 
 impl ScanReport {
+    /// The parts of a station's rig that this scan depends on.
+    pub fn parts_of(&self, rig: &Rig) -> Rig {
+        match &self.profiles {
+            None => parts_for(rig, &self.motion),
+            Some(p) if p.travel_mm.is_none() => parts_for_profiles(rig),
+            Some(_) => Rig::default(),
+        }
+    }
+
     /// Stands for the time at which a report was written, where it says none.
     pub(in crate::station) const NO_TIME: &str = "1970-01-01T00:00:00Z";
 

@@ -161,7 +161,7 @@ impl<'a> Work<'a> {
             ShotsWriter::resume(part, first, options.motion.frame(), &print)?
         } else {
             let sheet = &rig.need_laser_plane()?.value;
-            ShotsWriter::create(part, options.motion.frame(), scanner.stripe_along(), &print, sheet)?
+            ShotsWriter::create(part, options.motion.frame(), scanner.stripe_along(), &print, Some(sheet))?
         };
         Ok(Work {
             part,

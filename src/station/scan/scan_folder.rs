@@ -34,7 +34,7 @@ const FILES: [&str; 21] = [
     FORMER_PROGRESS,
     "found.json",
 ];
-pub(super) const CLOUD_FILE: &str = "cloud.ply";
+pub(in crate::station) const CLOUD_FILE: &str = "cloud.ply";
 /// Cloud and shots as measured, in the working folder, under the names of unfinished files: an interrupted scan
 /// resumes with these.
 pub(super) const MEASURED: [&str; 2] = ["cloud.ply.part", "shots.jsonl.part"];

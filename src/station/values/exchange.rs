@@ -7,7 +7,7 @@ use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Axis, AxisKind, Base, Camera, ORTHONORMAL_WARN, Plane, Ray, Rigid, Vec3};
 use crate::rig::{
-    Calibration, Covariance, HandEye, Joint, Kind, Quality, ROBOT_SIGMA_DEG, ROBOT_SIGMA_MM, Rig, Verdict, asked,
+    Calibration, Covariance, HandEye, Kind, Quality, ROBOT_SIGMA_DEG, ROBOT_SIGMA_MM, Rig, Verdict, asked,
 };
 use std::path::Path;
 
@@ -154,7 +154,7 @@ impl Values {
             hand_eye.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
         }
         let stored =
-            Rig { camera, laser_plane, pointer, hand_eye, base_camera, linear_axis, turntable, joint: Joint::Absent }
+            Rig { camera, laser_plane, pointer, hand_eye, base_camera, linear_axis, turntable, ..Rig::default() }
                 .store_all(station)
                 .map_err(|e| e.at(source.display()).next("correct the file; nothing was imported of it"))?;
         if stored.is_empty() {

@@ -5,13 +5,22 @@ use super::profile::Profile;
 use super::sequences::{by_turns, from_brackets, value};
 use crate::fault::{Fault, Result};
 use crate::files::{TableRow, natural, table};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Reads profiles from one file with many, or from a folder with one file each, in the order of their names (numbers
-/// in names are compared as numbers).
+/// in names are compared as numbers). Places without a measurement stay, with a number that is not finite.
 pub fn load(path: &Path) -> Result<Vec<Profile>> {
+    let mut out = Vec::new();
+    for f in files_of(path)? {
+        out.extend(load_file(&f)?);
+    }
+    Ok(out)
+}
+
+/// The files that [`load`] reads, in their order.
+pub fn files_of(path: &Path) -> Result<Vec<PathBuf>> {
     if !path.is_dir() {
-        return load_file(path);
+        return Ok(vec![path.to_owned()]);
     }
     let entries = std::fs::read_dir(path).map_err(|e| Fault::read(path, e))?;
     let mut files: Vec<_> = entries
@@ -27,11 +36,7 @@ pub fn load(path: &Path) -> Result<Vec<Profile>> {
             .cause("another folder")
             .next("give the folder with one profile a file, or one file with all"));
     }
-    let mut out = Vec::new();
-    for f in files {
-        out.extend(load_file(&f)?);
-    }
-    Ok(out)
+    Ok(files)
 }
 
 fn load_file(path: &Path) -> Result<Vec<Profile>> {
@@ -103,10 +108,7 @@ pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
             let numbers = cells.iter().map(|c| c.parse()).collect::<std::result::Result<Vec<f64>, _>>();
             let name = format!("{stem} line {number}");
             let points = by_turns(&numbers.map_err(|_| bad("is not a row of numbers"))?, &name)?;
-            out.push(Profile {
-                name,
-                points: points.into_iter().filter(|p| p.iter().all(|v| v.is_finite())).collect(),
-            });
+            out.push(Profile { name, points });
             continue;
         };
         let cell = |i: usize| cells.get(i).map(String::as_str).ok_or_else(|| bad("is too short"));
@@ -122,9 +124,7 @@ pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
             }
             out.push(Profile { name, points: Vec::new() });
         }
-        if point.iter().all(|v| v.is_finite()) {
-            out.last_mut().expect("pushed above").points.push(point);
-        }
+        out.last_mut().expect("pushed above").points.push(point);
     }
     if out.is_empty() {
         return Err(Fault::input("holds no points").cause("an empty file").next("export the profiles again"));
@@ -147,7 +147,7 @@ pub fn from_yaml(text: &str, stem: &str) -> Result<Vec<Profile>> {
         let name =
             if name.is_empty() || name == "-" { format!("{stem} {}", out.len()) } else { format!("{stem} {name}") };
         let points = matrix(body).map_err(|what| bad(&name, what))?;
-        out.push(Profile { name, points: points.into_iter().filter(|p| p.iter().all(|v| v.is_finite())).collect() });
+        out.push(Profile { name, points });
     }
     if out.is_empty() {
         return Err(Fault::input("holds no !!opencv-matrix")
@@ -191,13 +191,17 @@ fn matrix(body: &str) -> std::result::Result<Vec<[f64; 2]>, String> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::measured;
     use super::*;
 
     #[test]
     fn every_layout_gives_the_same_points() {
         let want = vec![[1.0, 10.0], [2.0, 11.5], [3.0, 12.0]];
         assert_eq!(from_csv("x_mm,z_mm\n1,10\n2,11.5\n3,12\n", "a").unwrap()[0].points, want);
-        assert_eq!(from_csv("1;10\n2;11.5\n3;12\n2.5;nan\n", "a").unwrap()[0].points, want);
+        // A place without a measurement stays where it is.
+        let gap = from_csv("1;10\n1.5;nan\n2;11.5\n3;12\n", "a").unwrap().remove(0).points;
+        assert!(gap.len() == 4 && !measured(&gap[1]));
+        assert_eq!(gap.into_iter().filter(measured).collect::<Vec<_>>(), want);
         let many = from_csv("profile,z,x\n0,10,1\n0,11.5,2\n0,12,3\n1,5,4\n", "a").unwrap();
         assert_eq!((many.len(), &many[0].points, many[1].points[0]), (2, &want, [4.0, 5.0]));
         let yaml = |m: &str| format!("%YAML:1.0\n---\nprofile_0: !!opencv-matrix\n{m}\n");
