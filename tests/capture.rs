@@ -19,6 +19,8 @@ mod exposures;
 mod gige;
 #[path = "capture/pairing.rs"]
 mod pairing;
+#[path = "capture/profiles.rs"]
+mod profiles;
 #[path = "capture/recording.rs"]
 mod recording;
 #[path = "capture/robot.rs"]

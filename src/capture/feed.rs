@@ -124,6 +124,7 @@ pub struct Feed {
     pictures: Pictures,
     name: String,
     device: String,
+    coordinates: Option<String>,
     stop: Arc<AtomicBool>,
     thread: Option<std::thread::JoinHandle<()>>,
 }
@@ -134,7 +135,7 @@ impl Feed {
     /// # Errors
     /// No thread can be started; a readout is stated although the source knows it.
     pub fn start(source: Box<dyn PictureSource>, options: FeedOptions) -> Result<Feed> {
-        let (name, device) = (source.name(), source.device());
+        let (name, device, coordinates) = (source.name(), source.device(), source.coordinates()?);
         let readout = stated_once(source.readout(), options.readout)?;
         let pictures = Pictures { format: source.format(), readout };
         let shared = Arc::new(Shared::default());
@@ -153,7 +154,7 @@ impl Feed {
         };
         let thread = std::thread::Builder::new().name("camera".into()).spawn(move || reader.run());
         let thread = Some(thread.map_err(|e| Fault::threads(&e))?);
-        Ok(Feed { shared, pictures, name, device, stop, thread })
+        Ok(Feed { shared, pictures, name, device, coordinates, stop, thread })
     }
 
     /// Size and depth of all its pictures.
@@ -174,6 +175,11 @@ impl Feed {
     /// Identity of the device, however it was named.
     pub fn device(&self) -> &str {
         &self.device
+    }
+
+    /// What a 3-D camera states about its coordinates, as JSON; none if it sends light.
+    pub fn coordinates(&self) -> Option<&str> {
+        self.coordinates.as_deref()
     }
 
     /// The next picture, waiting for at most `within`.
@@ -260,7 +266,8 @@ impl Drop for Feed {
 }
 
 fn weight(picture: &Picture) -> usize {
-    Format::of(&picture.image).bytes() + std::mem::size_of::<Picture>()
+    let places = picture.profiles.iter().flatten().map(Vec::len).sum::<usize>();
+    Format::of(&picture.image).bytes() + std::mem::size_of::<Picture>() + places * std::mem::size_of::<[f64; 2]>()
 }
 
 /// The thread that requests pictures.

@@ -31,6 +31,9 @@ pub struct Picture {
     /// Position of what moves in the middle of the exposure. Only sources that know it state it: a played recording,
     /// a simulated station.
     pub stand: Option<Stand>,
+    /// Of a 3-D camera: for each row the places of its profile, x and z in mm of the camera, NaN where nothing was
+    /// measured. The image then shows where something was.
+    pub profiles: Option<Vec<Vec<[f64; 2]>>>,
 }
 
 /// How far the numbers of pictures are comparable: what happened to the source before a picture.
@@ -81,6 +84,14 @@ pub trait PictureSource: Send {
     /// How its pictures are read from the sensor; none if unknown.
     fn readout(&self) -> Option<Readout> {
         None
+    }
+
+    /// What a 3-D camera states about its coordinates, as JSON; none if it sends light.
+    ///
+    /// # Errors
+    /// A camera that sends coordinates which cannot be used: the reason.
+    fn coordinates(&self) -> Result<Option<String>> {
+        Ok(None)
     }
 
     /// The next picture, waiting for at most `within`.

@@ -197,11 +197,28 @@ fn depth(text: Option<&str>) -> Said<u8> {
 }
 
 impl CameraUri {
-    /// Opens the source; it delivers pictures from then on. `raw` states the format of frames on a pipe.
+    /// Opens the source; it delivers pictures of light from then on. `raw` states the format of frames on a pipe.
     ///
     /// # Errors
-    /// Nothing is there, it is in use, or it needs `raw`.
+    /// Nothing is there, it is in use, it needs `raw`, or it is a 3-D camera that sends coordinates.
     pub fn open(&self, raw: Option<RawFormat>) -> Result<Box<dyn PictureSource>> {
+        let source = self.open_any(raw)?;
+        match source.coordinates() {
+            Ok(None) => Ok(source),
+            _ => Err(Fault::input(format!("{}: sends coordinates, pictures of the light are wanted", source.name()))
+                .cause("a 3-D camera that measures its profiles itself")
+                .next(
+                    "record its profiles with sheetlight record and scan them with sheetlight scan-profiles, or let \
+                     it send pictures: sheetlight camera set PixelFormat Mono8",
+                )),
+        }
+    }
+
+    /// The same, and 3-D cameras that send coordinates.
+    ///
+    /// # Errors
+    /// As [`CameraUri::open`].
+    pub fn open_any(&self, raw: Option<RawFormat>) -> Result<Box<dyn PictureSource>> {
         Ok(match self {
             CameraUri::Input => {
                 let raw = raw.ok_or_else(|| {

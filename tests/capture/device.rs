@@ -24,6 +24,12 @@ const LATCH: u32 = 0x0944;
 const MONO8: u32 = 0x0108_0001;
 const MONO12: u32 = 0x0110_0005;
 const BAYER: u32 = 0x0108_0009;
+/// PFNC's code of heights of 16 bits.
+const COORD3D_C16: u32 = 0x0110_00b8;
+/// Of the 3D Scan Control: the output mode, the selector, and for each coordinate scale, offset and invalid number.
+const MODE: u32 = 0x10020;
+const SELECTOR: u32 = 0x10024;
+const OF_AXES: u32 = 0x10030;
 
 /// What the camera does wrong.
 #[derive(Clone, Copy, Default)]
@@ -34,6 +40,12 @@ pub struct Faults {
     pub resends: bool,
     /// It sends colours.
     pub colour: bool,
+    /// It sends heights: the levels are of Coord3D_C16, with these scales and offsets of A and C, mm; 0 is invalid.
+    pub heights: Option<[[f32; 2]; 2]>,
+    /// Its output mode is UncalibratedC.
+    pub uncalibrated: bool,
+    /// It sends payloads of several parts.
+    pub multipart: bool,
     /// After so many pictures its clock goes on by so many ns.
     pub jump: Option<(u64, u64)>,
     /// Its first picture has this number; 0: 1.
@@ -101,6 +113,18 @@ impl Device {
         if faults.colour {
             registers.lock().unwrap().put(FORMAT, BAYER);
         }
+        if let Some([a, c]) = faults.heights {
+            let mut r = registers.lock().unwrap();
+            r.xml = xml(true).into_bytes();
+            let url = format!("Local:test.xml;{XML:x};{:x}", r.xml.len());
+            r.words(0x200, &url);
+            r.put(FORMAT, COORD3D_C16);
+            r.put(MODE, if faults.uncalibrated { 0 } else { 7 });
+            for (axis, [scale, offset]) in [(0, a), (2, c)] {
+                r.put(OF_AXES + 16 * axis, scale.to_bits());
+                r.put(OF_AXES + 16 * axis + 4, offset.to_bits());
+            }
+        }
         let (stop, taken, lost) =
             (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(0)));
         let sent: Arc<Mutex<VecDeque<(u64, Vec<Vec<u8>>)>>> = Arc::default();
@@ -131,7 +155,7 @@ impl Drop for Device {
 }
 
 fn registers(ip: Ipv4Addr, picture: &Image, deep: bool) -> Registers {
-    let mut r = Registers { memory: vec![0; 0x10100], xml: xml().into_bytes() };
+    let mut r = Registers { memory: vec![0; 0x10100], xml: xml(false).into_bytes() };
     r.put(0, 0x0001_0002);
     r.put(4, 0x8000_0001);
     r.put(0x0c, u32::from(ip));
@@ -160,7 +184,38 @@ fn registers(ip: Ipv4Addr, picture: &Image, deep: bool) -> Registers {
     r
 }
 
-fn xml() -> String {
+/// Features of the 3D Scan Control; those of a coordinate lie 16 bytes apart, by the selector.
+fn scan3d() -> String {
+    let word = |name: &str, at: u32, entries: &[(&str, u32)]| {
+        let of = |(n, v): &(&str, u32)| format!("<EnumEntry Name=\"{n}\"><Value>{v}</Value></EnumEntry>");
+        let entries: String = entries.iter().map(of).collect();
+        format!(
+            "<Enumeration Name=\"{name}\">{entries}<pValue>{name}Reg</pValue></Enumeration><IntReg \
+             Name=\"{name}Reg\"><Address>0x{at:x}</Address><Length>4</Length><AccessMode>RW</AccessMode>\
+             <pPort>Device</pPort><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>"
+        )
+    };
+    let float = |name: &str, at: u32| {
+        format!(
+            "<Float Name=\"{name}\"><pValue>{name}Reg</pValue></Float><FloatReg Name=\"{name}Reg\">\
+             <Address>0x{at:x}</Address><pIndex Offset=\"16\">Scan3dCoordinateSelectorReg</pIndex>\
+             <Length>4</Length><AccessMode>RO</AccessMode><pPort>Device</pPort>\
+             <Endianess>BigEndian</Endianess></FloatReg>"
+        )
+    };
+    [
+        word("Scan3dOutputMode", MODE, &[("UncalibratedC", 0), ("RectifiedC", 7)]),
+        word("Scan3dDistanceUnit", 0x10028, &[("Millimeter", 0), ("Inch", 1)]),
+        word("Scan3dCoordinateSelector", SELECTOR, &[("CoordinateA", 0), ("CoordinateB", 1), ("CoordinateC", 2)]),
+        float("Scan3dCoordinateScale", OF_AXES),
+        float("Scan3dCoordinateOffset", OF_AXES + 4),
+        float("Scan3dInvalidDataValue", OF_AXES + 8),
+        "<Boolean Name=\"Scan3dInvalidDataFlag\"><Value>1</Value></Boolean>".into(),
+    ]
+    .concat()
+}
+
+fn xml(heights: bool) -> String {
     let reg = |name: &str, at: u32, mode: &str| {
         format!(
             "<IntReg \
@@ -199,6 +254,7 @@ fn xml() -> String {
             "<Enumeration Name=\"PixelFormat\"><EnumEntry \
                  Name=\"Mono8\"><Value>{MONO8}</Value></EnumEntry><EnumEntry \
                  Name=\"BayerRG8\"><Value>{BAYER}</Value></EnumEntry><EnumEntry \
+                 Name=\"Coord3D_C16\"><Value>{COORD3D_C16}</Value></EnumEntry><EnumEntry \
                  Name=\"Mono12\"><Value>{MONO12}</Value></EnumEntry><pValue>PixelFormatReg</pValue></Enumeration>"
         ),
         reg("PixelFormat", FORMAT, "RW"),
@@ -223,6 +279,7 @@ fn xml() -> String {
          <pPort>Device</pPort><Cachable>NoCache</Cachable><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess>\
          </IntReg>"
             .into(),
+        if heights { scan3d() } else { String::new() },
         "<Port Name=\"Device\"></Port>".into(),
     ];
     format!(
@@ -311,11 +368,13 @@ fn answer(
     }
 }
 
-fn packets(picture: &Image, block: u64, ns: u64, size: usize) -> Vec<Vec<u8>> {
+fn packets(picture: &Image, block: u64, ns: u64, size: usize, faults: Faults) -> Vec<Vec<u8>> {
     let (bytes, code): (Vec<u8>, u32) = match &picture.pixels {
         Pixels::U8(p) => (p.clone(), MONO8),
         Pixels::U16(p) => (p.iter().flat_map(|l| l.to_le_bytes()).collect(), MONO12),
     };
+    let code = if faults.heights.is_some() { COORD3D_C16 } else { code };
+    let (payload, data) = if faults.multipart { (10, 7) } else { (1, 3) };
     let head = |kind: u8, number: u32| {
         let mut out = vec![0, 0];
         out.extend((block as u16).to_be_bytes());
@@ -324,17 +383,17 @@ fn packets(picture: &Image, block: u64, ns: u64, size: usize) -> Vec<Vec<u8>> {
         out
     };
     let mut leader = head(1, 0);
-    leader.extend([0, 0, 0, 1]);
+    leader.extend([0, 0, 0, payload]);
     leader.extend(ns.to_be_bytes());
     [code, picture.width, picture.height, 0, 0, 0].iter().for_each(|w| leader.extend(w.to_be_bytes()));
     let mut all = vec![leader];
     for chunk in bytes.chunks(size - 36) {
-        let mut packet = head(3, all.len() as u32);
+        let mut packet = head(data, all.len() as u32);
         packet.extend(chunk);
         all.push(packet);
     }
     let mut trailer = head(2, all.len() as u32);
-    trailer.extend([0, 0, 0, 1]);
+    trailer.extend([0, 0, 0, payload]);
     trailer.extend(picture.height.to_be_bytes());
     all.push(trailer);
     all
@@ -381,7 +440,7 @@ fn stream(
         // Numbers of 16 bits without 0.
         let block = (done + faults.first.saturating_sub(1)) % 65_535 + 1;
         let ns = faults.clock(begun, done);
-        let all = packets(&pictures[done as usize % pictures.len()], block, ns, size);
+        let all = packets(&pictures[done as usize % pictures.len()], block, ns, size, faults);
         for packet in &all {
             dice = dice.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             if (dice >> 33) % 1000 < faults.lost_per_mille {

@@ -145,6 +145,7 @@ impl PictureSource for Camera {
             exposure_ns: self.states.then_some((1e3 * us) as u64),
             count: None,
             stand: Some(Stand::Robot(at)),
+            profiles: None,
         }))
     }
 

@@ -39,7 +39,16 @@ impl PictureSource for Prepared {
         self.next += 1;
         let (id, device_ns) = (self.next as u64, Some(ns));
         let (host_ns, exposure_ns) = (ns + self.under_way, Some(MS));
-        Event::Picture(Box::new(Picture { image, id, device_ns, host_ns, exposure_ns, count: None, stand: None }))
+        Event::Picture(Box::new(Picture {
+            image,
+            id,
+            device_ns,
+            host_ns,
+            exposure_ns,
+            count: None,
+            stand: None,
+            profiles: None,
+        }))
     }
     fn clock(&mut self) -> Result<Option<RoundTrip>> {
         Ok(Some(RoundTrip { before_ns: BEGUN, there_ns: BEGUN, after_ns: BEGUN }))
@@ -258,7 +267,16 @@ impl PictureSource for Cut {
         let count = Some(if self.power { 100 + 20 * k } else { 20 * (k % 5) } as i64);
         let (device_ns, host_ns) = (Some(self.clock_ns()), now_ns());
         let image = Image::from_u8(1, 1, vec![k as u8]);
-        Event::Picture(Box::new(Picture { image, id, device_ns, host_ns, exposure_ns: None, count, stand: None }))
+        Event::Picture(Box::new(Picture {
+            image,
+            id,
+            device_ns,
+            host_ns,
+            exposure_ns: None,
+            count,
+            stand: None,
+            profiles: None,
+        }))
     }
     fn clock(&mut self) -> Result<Option<RoundTrip>> {
         let before_ns = now_ns();

@@ -257,6 +257,7 @@ mod tests {
                 exposure_ns: None,
                 count: None,
                 stand: None,
+                profiles: None,
             }))
         }
         fn clock(&mut self) -> Result<Option<RoundTrip>> {

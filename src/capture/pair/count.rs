@@ -93,7 +93,7 @@ mod tests {
 
     fn picture(id: u64, count: Option<i64>) -> Picture {
         let image = Image::from_u8(1, 1, vec![0]);
-        Picture { image, id, device_ns: None, host_ns: 0, exposure_ns: None, count, stand: None }
+        Picture { image, id, device_ns: None, host_ns: 0, exposure_ns: None, count, stand: None, profiles: None }
     }
 
     /// The counts that pictures (number, count, outages, resets) are paired with, and the number of messages.

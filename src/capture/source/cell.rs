@@ -181,7 +181,16 @@ impl PictureSource for CellCamera {
                 self.sent = sent.sent;
                 let Sent { image, id, device_ns, exposure_ns, count, .. } = *sent;
                 let (device_ns, exposure_ns) = (Some(device_ns), Some(exposure_ns));
-                Event::Picture(Box::new(Picture { image, id, device_ns, host_ns, exposure_ns, count, stand: None }))
+                Event::Picture(Box::new(Picture {
+                    image,
+                    id,
+                    device_ns,
+                    host_ns,
+                    exposure_ns,
+                    count,
+                    stand: None,
+                    profiles: None,
+                }))
             }
             Err(RecvTimeoutError::Timeout) => Event::Quiet,
             Err(RecvTimeoutError::Disconnected) => {

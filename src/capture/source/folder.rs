@@ -125,8 +125,16 @@ impl FolderCamera {
             Ok(image) if self.next == 0 || Format::of(&image) == self.format => {
                 let host_ns = now_ns();
                 let id = self.over(path);
-                let picture =
-                    Picture { image, id, device_ns: None, host_ns, exposure_ns: None, count: None, stand: None };
+                let picture = Picture {
+                    image,
+                    id,
+                    device_ns: None,
+                    host_ns,
+                    exposure_ns: None,
+                    count: None,
+                    stand: None,
+                    profiles: None,
+                };
                 Some(Event::Picture(Box::new(picture)))
             }
             Ok(image) => {

@@ -57,8 +57,16 @@ impl PictureSource for Pipe {
             Ok(Ok(Some((image, host_ns)))) => {
                 let id = self.came;
                 self.came += 1;
-                let picture =
-                    Picture { image, id, device_ns: None, host_ns, exposure_ns: None, count: None, stand: None };
+                let picture = Picture {
+                    image,
+                    id,
+                    device_ns: None,
+                    host_ns,
+                    exposure_ns: None,
+                    count: None,
+                    stand: None,
+                    profiles: None,
+                };
                 Event::Picture(Box::new(picture))
             }
             Err(RecvTimeoutError::Timeout) => Event::Quiet,

@@ -116,7 +116,16 @@ impl PictureSource for Player {
         };
         let device_ns = Some(id * self.period);
         let (stand, host_ns) = (*stand, now_ns());
-        Event::Picture(Box::new(Picture { image, id, device_ns, host_ns, exposure_ns: None, count: None, stand }))
+        Event::Picture(Box::new(Picture {
+            image,
+            id,
+            device_ns,
+            host_ns,
+            exposure_ns: None,
+            count: None,
+            stand,
+            profiles: None,
+        }))
     }
 
     fn sent(&self) -> Option<u64> {

@@ -316,6 +316,7 @@ impl PictureSource for SimCamera {
             exposure_ns: Some(exposure),
             count: None,
             stand: Some(stand),
+            profiles: None,
         };
         Event::Picture(Box::new(picture))
     }

@@ -75,12 +75,22 @@ const PATIENCE: Duration = Duration::from_secs(10);
 
 impl Named {
     fn open(&self, console: &Console) -> Result<Box<dyn PictureSource>> {
+        self.waits(console);
+        self.camera.open(self.raw)
+    }
+
+    /// For its features: whatever it sends.
+    fn open_any(&self, console: &Console) -> Result<Box<dyn PictureSource>> {
+        self.waits(console);
+        self.camera.open_any(self.raw)
+    }
+
+    fn waits(&self, console: &Console) {
         if let CameraUri::Folder { path, wait_s, .. } = &self.camera {
             let folder = path.display();
             console
                 .say(format!("waiting up to {wait_s:.0} s for a new picture in {folder}; those in it are not taken"));
         }
-        self.camera.open(self.raw)
     }
 }
 
@@ -161,7 +171,7 @@ fn list(console: &Console) -> Result<()> {
 }
 
 fn show(named: &Named, console: &Console) -> Result<()> {
-    let mut source = named.open(console)?;
+    let mut source = named.open_any(console)?;
     let features = source.features()?;
     let mut text = format!("{}: {}\n", source.name(), source.format());
     for f in &features {
@@ -174,7 +184,7 @@ fn show(named: &Named, console: &Console) -> Result<()> {
 }
 
 fn set(key: &str, value: &str, named: &Named, console: &Console) -> Result<()> {
-    let mut source = named.open(console)?;
+    let mut source = named.open_any(console)?;
     source.set(key, value)?;
     let now = source.features()?.into_iter().find(|f| f.name == key);
     // Cameras from before the standard's second version use another name.

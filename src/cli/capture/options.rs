@@ -3,6 +3,7 @@
 
 use super::readout::ReadoutArgs;
 use crate::capture::pair::{Counting, PoseFeed, PoseUri, Still, Table, Way};
+use crate::capture::record::Rows;
 use crate::capture::{Bracketed, CameraUri, Exposures, Feed, FeedOptions, Latency, Mode, RawFormat, Stream};
 use crate::cli::terminal::arguments::parse;
 use crate::cli::terminal::console::Console;
@@ -118,6 +119,12 @@ impl Running {
         Feed::start(self.named()?.open(raw)?, options)
     }
 
+    /// Opens the camera, also one that sends profiles.
+    fn open_any(&self, raw: Option<RawFormat>, mode: Mode) -> Result<Feed> {
+        let options = self.feed_options(mode)?;
+        Feed::start(self.named()?.open_any(raw)?, options)
+    }
+
     fn feed_options(&self, mode: Mode) -> Result<FeedOptions> {
         Ok(FeedOptions {
             mode,
@@ -188,10 +195,45 @@ impl Capture {
         station: Option<&Path>,
         mode: Mode,
     ) -> Result<Stream> {
+        self.opened(poses, station, || self.running.open(raw, mode))
+    }
+
+    /// The same for recording: also a 3-D camera that sends profiles.
+    pub fn open_to_record(
+        &self,
+        raw: Option<RawFormat>,
+        poses: Option<&Path>,
+        station: Option<&Path>,
+    ) -> Result<Stream> {
+        self.opened(poses, station, || self.running.open_any(raw, Mode::All))
+    }
+
+    /// Whether a profile of a camera that sends several in a picture has a pose.
+    ///
+    /// # Errors
+    /// Something else moves than a robot that carries the camera.
+    pub fn rows(&self) -> Result<Rows> {
+        match self.pair() {
+            Pair::None => return Ok(Rows::Unposed),
+            _ if self.motion.0 != Motion::default() => {}
+            Pair::Step => return Ok(Rows::Standing),
+            Pair::Count | Pair::Clock | Pair::Given => return Ok(Rows::Moving),
+        }
+        Err(Fault::usage("--motion names something else than a robot that carries the camera")
+            .cause("profiles are scanned with the pose of a sensor on the flange")
+            .next("leave --motion out; profiles without poses are recorded without --pair"))
+    }
+
+    fn opened(
+        &self,
+        poses: Option<&Path>,
+        station: Option<&Path>,
+        open: impl FnOnce() -> Result<Feed>,
+    ) -> Result<Stream> {
         let clocked = station.filter(|_| self.pair() == Pair::Clock);
         let latency = clocked.map(Latency::load).transpose()?.flatten();
         let way = self.way(self.running.named()?, poses, latency.as_ref())?;
-        let feed = self.running.open(raw, mode)?;
+        let feed = open()?;
         latency.map_or(Ok(()), |l| l.of(Some(&self.sources(&feed))))?;
         Ok(Stream::new(feed, way))
     }

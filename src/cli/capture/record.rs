@@ -2,8 +2,10 @@
 //! Frame and unit: docs/file-formats.md.
 
 use super::options::Capture;
-use crate::capture::record::{RecordReport, Recorder, RecorderOptions, Shows, Store, record, record_poses};
-use crate::capture::{Mode, RawFormat, Stream};
+use crate::capture::record::{
+    RecordReport, Recorder, RecorderOptions, Shows, Store, record, record_poses, record_profiles,
+};
+use crate::capture::{RawFormat, Stream};
 use crate::cli::terminal::arguments::parse;
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
@@ -14,7 +16,8 @@ use std::path::PathBuf;
 ///
 /// Ends after --shots, --seconds, or Ctrl-C. The recording can be opened at any moment, also after a crash. The
 /// account lists every picture that the camera sent: complete, incomplete, missed, late, dropped (queue, disk) or
-/// unpaired. Pictures without a pose are excluded and listed in left_out.json.
+/// unpaired. Pictures without a pose are excluded and listed in left_out.json. Of a 3-D camera that sends heights, OUT
+/// gets profiles and poses for scan-profiles.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight record --camera gige://first --out recordings/board7 --shots 400
@@ -71,11 +74,14 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     }
     let capture = &args.capture;
     let (mut stream, bracket) = if args.exposures.is_empty() {
-        (capture.open(args.raw, args.poses.as_deref(), args.station.as_deref(), Mode::All)?, None)
+        (capture.open_to_record(args.raw, args.poses.as_deref(), args.station.as_deref())?, None)
     } else {
         let (stream, exposures, poses) = capture.open_bracketed(args.raw, &args.exposures, args.black_level)?;
         (stream, Some((exposures, poses)))
     };
+    if stream.feed().coordinates().is_some() {
+        return profiles(args, &mut stream, console);
+    }
     let exposures_us = bracket.as_ref().map_or(Vec::new(), |(e, _)| e.us().to_vec());
     let each = exposures_us.len().max(1) as u64;
     let options = RecorderOptions {
@@ -105,7 +111,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     teller.tell(console, &bar);
     bar.finish_and_clear();
     let report = report.map_err(|fault| Fault { what: format!("{}; {}", fault.what, stream.account()), ..fault })?;
-    console.result(&report, &summary(&report, args));
+    console.result(&report, &summary(&report, args, "shots"));
     if report.shots == 0 && report.exposures.is_some() {
         return Err(Fault::refused(format!("no pose was recorded: {}", report.account))
             .cause("nothing stood still for all exposures of a pose, or the poses do not come")
@@ -119,9 +125,39 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     Ok(())
 }
 
-fn summary(r: &RecordReport, args: &Args) -> String {
+/// Records the profiles of a 3-D camera.
+fn profiles(args: &Args, stream: &mut Stream, console: &Console) -> Result<()> {
+    if args.shows != Shows::Line || args.board.is_some() || args.store != Store::Auto {
+        return Err(Fault::usage("--shows, --board or --store, and a camera that sends profiles")
+            .cause("there are no pictures that could show a board or be stored")
+            .next("leave these options out"));
+    }
+    let (rows, capture) = (args.capture.rows()?, &args.capture);
+    let sources = capture.sources(stream.feed());
+    let mut teller = capture.running.teller();
+    let bar = console.bar("recording", 0);
+    let report = record_profiles(stream, &args.out, rows, &sources, |stream, said| {
+        teller.hear(stream, said);
+        teller.tell(console, &bar);
+        bar.set_position(stream.account().used);
+    });
+    teller.account(stream);
+    teller.tell(console, &bar);
+    bar.finish_and_clear();
+    let report = report.map_err(|fault| Fault { what: format!("{}; {}", fault.what, stream.account()), ..fault })?;
+    console.result(&report, &summary(&report, args, "profiles"));
+    if report.shots == 0 {
+        return Err(Fault::refused(format!("no profile was recorded: {}", report.account))
+            .cause("the camera waits for a trigger, or no picture could be paired or read")
+            .next("check the camera with: sheetlight camera show; left_out.json has the reasons"));
+    }
+    Ok(())
+}
+
+/// `of` names what was recorded.
+fn summary(r: &RecordReport, args: &Args, of: &str) -> String {
     let mut s =
-        format!("{} shots, {:.1} MB, in {}\n{}\n", r.shots, r.bytes as f64 * 1e-6, args.out.display(), r.account);
+        format!("{} {of}, {:.1} MB, in {}\n{}\n", r.shots, r.bytes as f64 * 1e-6, args.out.display(), r.account);
     if r.account.unexplained() != 0 {
         s += &format!("{} pictures are unexplained\n", r.account.unexplained());
     }

@@ -1,6 +1,7 @@
 //! In: a GigE Vision camera. Out: its pictures, reports of incomplete ones; its features; its clock.
 //! Frame and unit: the camera's clock in ns.
 
+use super::coordinates::{Coordinates, Told, is_coordinates};
 use super::find::find;
 use super::numbers::Numbers;
 use super::pixels::{depth, unpack};
@@ -10,6 +11,8 @@ use crate::capture::feature::{Feature, Range, Value};
 use crate::capture::format::Format;
 use crate::capture::picture::{Event, Picture, PictureSource};
 use crate::fault::{Fault, Result};
+use crate::raster::Image;
+use crate::recording::profiles::measured;
 use std::time::{Duration, Instant};
 use viva_genicam::genapi::FeatureValue;
 use viva_genicam::gige::DeviceInfo;
@@ -31,7 +34,8 @@ const FORMER: [(&str, &str); 5] = [
     ("AcquisitionFrameRateEnable", "AcquisitionFrameRateEnabled"),
 ];
 /// Features that are restored, in this order, when a camera comes back with its defaults.
-const SETTINGS: [&str; 21] = [
+const SETTINGS: [&str; 22] = [
+    "Scan3dOutputMode",
     "PixelFormat",
     "BinningHorizontal",
     "BinningVertical",
@@ -67,6 +71,8 @@ pub struct GigeCamera {
     format: Format,
     readout: Option<Readout>,
     pixel_format: String,
+    /// What it states about the coordinates that it sends, or why they cannot be used; none if it sends light.
+    coordinates: Option<Result<Coordinates>>,
     exposure_ns: Option<u64>,
     /// Whether software triggers each picture (TriggerMode On, TriggerSource Software).
     on_command: bool,
@@ -76,6 +82,8 @@ pub struct GigeCamera {
     chunk: Option<&'static str>,
     resent: u64,
     heard: Instant,
+    /// Whether it was seen to send something that is no picture.
+    foreign: bool,
     numbers: Numbers,
     /// Its settings when it began to send. A camera that lost its power comes back without them.
     kept: Vec<(&'static str, String)>,
@@ -120,6 +128,7 @@ impl GigeCamera {
             format: Format { width: 1, height: 1, bits: 8 },
             readout: None,
             pixel_format: String::new(),
+            coordinates: None,
             exposure_ns: None,
             on_command: false,
             tick_ns: 1.0,
@@ -127,6 +136,7 @@ impl GigeCamera {
             chunk: None,
             resent: 0,
             heard: Instant::now(),
+            foreign: false,
             numbers: Numbers::default(),
             kept: Vec::new(),
         };
@@ -144,7 +154,11 @@ impl GigeCamera {
             return Err(Fault::input(format!("{at}: says its pictures are {width}x{height}")).next("reset the camera"));
         };
         self.pixel_format = self.camera.get_enum("PixelFormat").map_err(|e| said(&format!("{at}: PixelFormat"), &e))?;
-        self.format = Format { width, height, bits: depth(&self.pixel_format).map_err(|e| e.at(&at))? };
+        let format = self.pixel_format.clone();
+        self.coordinates = is_coordinates(&format).then(|| Coordinates::told(self, &format).map_err(|e| e.at(&at)));
+        // Of coordinates the picture shows only where something was measured.
+        let bits = if self.coordinates.is_some() { 8 } else { depth(&format).map_err(|e| e.at(&at))? };
+        self.format = Format { width, height, bits };
         self.readout = super::readout::of(&self.camera);
         let exposure = EXPOSURE.iter().find_map(|name| self.camera.get_float(name).ok());
         self.exposure_ns = exposure.filter(|us| (0.0..1e9).contains(us)).map(|us| (1e3 * us) as u64);
@@ -202,6 +216,9 @@ impl GigeCamera {
         let count = self.chunk_count(&frame);
         let device_ns = frame.ts_dev.map(|t| self.ns(t));
         let format = frame.pixel_format.name().unwrap_or(&self.pixel_format).to_owned();
+        if self.coordinates.is_some() {
+            return self.measured(frame, id, device_ns, host_ns, count);
+        }
         let viva_genicam::Frame { payload, raw_payload, width, height, padding_x, .. } = frame;
         // The two share the bytes: dropping one lets the other be converted without a copy.
         drop(raw_payload);
@@ -209,10 +226,43 @@ impl GigeCamera {
         match image {
             Ok(image) if Format::of(&image) == self.format => {
                 let exposure_ns = self.exposure_ns;
-                Event::Picture(Box::new(Picture { image, id, device_ns, host_ns, exposure_ns, count, stand: None }))
+                let (stand, profiles) = (None, None);
+                let picture = Picture { image, id, device_ns, host_ns, exposure_ns, count, stand, profiles };
+                Event::Picture(Box::new(picture))
             }
             Ok(image) => {
                 Event::Incomplete { id, why: format!("is {}, the camera said {}", Format::of(&image), self.format) }
+            }
+            Err(fault) => Event::Incomplete { id, why: fault.what },
+        }
+    }
+
+    /// A picture of coordinates.
+    fn measured(
+        &self,
+        frame: viva_genicam::Frame,
+        id: u64,
+        device_ns: Option<u64>,
+        host_ns: u64,
+        count: Option<i64>,
+    ) -> Event {
+        let told = match self.coordinates.as_ref().expect("asked by the caller") {
+            Ok(told) => told,
+            Err(fault) => return Event::Lost(fault.clone()),
+        };
+        let size = [frame.width, frame.height];
+        let named = frame.pixel_format.name().is_none_or(|is| is == told.pixel_format);
+        if !named || size != [self.format.width, self.format.height] {
+            let (now, [w, h]) = (frame.pixel_format, size);
+            return Event::Incomplete { id, why: format!("is {w}x{h} in {now}, the camera said {}", self.format) };
+        }
+        match told.profiles(frame.width, frame.height, usize::from(frame.padding_x), &frame.payload) {
+            Ok(profiles) => {
+                let lit = |p: &[f64; 2]| if measured(p) { u8::MAX } else { 0 };
+                let image = Image::from_u8(frame.width, frame.height, profiles.iter().flatten().map(lit).collect());
+                let (exposure_ns, stand, profiles) = (self.exposure_ns, None, Some(profiles));
+                let picture = Picture { image, id, device_ns, host_ns, exposure_ns, count, stand, profiles };
+                Event::Picture(Box::new(picture))
             }
             Err(fault) => Event::Incomplete { id, why: fault.what },
         }
@@ -268,14 +318,21 @@ impl PictureSource for GigeCamera {
     }
 
     fn reopens(&self) -> bool {
-        true
+        !self.foreign
+    }
+
+    fn coordinates(&self) -> Result<Option<String>> {
+        match &self.coordinates {
+            Some(told) => told.clone().map(|told| Some(serde_json::to_string(&told).expect("plain data"))),
+            None => Ok(None),
+        }
     }
 
     fn reopen(&mut self) -> Result<()> {
         self.stream = None;
         let (at, device) = (format!("gige://{}", self.word), find(&self.word)?);
         self.camera = blocking::connect(&device).map_err(|e| said(&at, &e))?;
-        let former = (self.format, self.readout);
+        let (former, coordinates) = ((self.format, self.readout), self.coordinates.clone());
         for (name, value) in self.kept.clone() {
             let is = self.feature(name).and_then(|f| f.value);
             if is.is_some_and(|v| v.to_string() != value) {
@@ -287,6 +344,10 @@ impl PictureSource for GigeCamera {
             return Err(
                 Fault::input(format!("the camera is {} now, was {}", self.format, former.0)).next("start again")
             );
+        }
+        if self.coordinates != coordinates {
+            let what = "the camera states other coordinates than before it was lost";
+            return Err(Fault::input(what).next("start again"));
         }
         if self.readout != former.1 {
             let words = |r: Option<Readout>| r.map_or("not known".into(), |r| r.to_string());
@@ -346,6 +407,17 @@ impl PictureSource for GigeCamera {
     }
 }
 
+impl Told for GigeCamera {
+    fn value(&mut self, name: &str) -> Option<Value> {
+        self.camera.invalidate(name);
+        self.feature(name)?.value
+    }
+
+    fn choose(&mut self, name: &str, entry: &str) -> Result<()> {
+        self.camera.set(name, entry).map_err(|e| said(&format!("{name} = {entry}"), &e))
+    }
+}
+
 impl GigeCamera {
     /// The next event from the network.
     fn receive(&mut self, within: Duration) -> Event {
@@ -365,6 +437,16 @@ impl GigeCamera {
                     return Event::Quiet;
                 }
                 self.heard = Instant::now();
+                let seen = self.stream.as_ref().map(FrameStream::stats).unwrap_or_default();
+                if seen.frames_complete + seen.frames_incomplete == 0 && seen.packets_ignored_unsupported > 0 {
+                    self.foreign = true;
+                    let n = seen.packets_ignored_unsupported;
+                    return Event::Lost(
+                        Fault::input(format!("gige://{}: {n} packets of another payload than a picture", self.word))
+                            .cause("the camera sends multi-part payloads (several components at once) or files")
+                            .next("enable one component and a single-part payload: sheetlight camera show"),
+                    );
+                }
                 // A camera that waits for a trigger sends nothing but answers queries.
                 let there = self.camera.transport().control_state() == ControlState::Held;
                 self.camera.invalidate("Width");
