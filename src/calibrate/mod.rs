@@ -3,7 +3,6 @@
 //! them.
 
 pub mod axis;
-pub mod ball;
 pub mod boards;
 pub mod camera;
 pub mod components;
@@ -16,6 +15,7 @@ pub mod limits;
 pub mod measured_pose;
 pub mod pointer;
 pub mod pose;
+pub mod profile_sensor;
 pub mod projection;
 pub mod report;
 pub mod scatter;

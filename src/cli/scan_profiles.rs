@@ -4,7 +4,7 @@
 use super::terminal::arguments::numbers;
 use super::terminal::console::Console;
 use super::terminal::outputs::{self, Inputs};
-use crate::calibrate::ball::missing::Heights;
+use crate::calibrate::profile_sensor::missing::Heights;
 use crate::fault::Result;
 use crate::rig::Rig;
 use crate::scan::GridOptions;

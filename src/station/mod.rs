@@ -38,7 +38,6 @@ pub use calibrate::auto::options::AutoRun;
 pub use calibrate::auto::procedure::calibrate_auto;
 pub use calibrate::auto::result::{AutoResult, Ended};
 pub use calibrate::axis::{AxisRun, calibrate_axis};
-pub use calibrate::ball::{calibrate_profile_hand_eye, evaluate_profile_hand_eye};
 pub use calibrate::board_views::{Boards, FrameBoard, boards};
 pub use calibrate::hand_eye::{
     Calibrated, HandEyeResult, HandEyeRun, PosePairs, calibrate_hand_eye, calibrate_hand_eye_from_poses,
@@ -48,6 +47,9 @@ pub use calibrate::laser_plane::{LaserPlaneRun, calibrate_laser_plane};
 pub use calibrate::latency::{LatencyFound, calibrate_latency};
 pub use calibrate::mount::{Mounted, mount_of};
 pub use calibrate::pointer::{PointerRun, calibrate_pointer};
+pub use calibrate::profile_sensor::{
+    ProfileEvaluation, ProfileTarget, calibrate_profile_hand_eye, evaluate_profile_hand_eye,
+};
 pub use edit::{changed, edited, point_added, point_chosen, point_taken_out};
 pub use filter::{filter_map, filter_scan, left};
 pub use find::{

@@ -2,13 +2,13 @@
 //! Out: a scan folder as of pictures: cloud, height map, shots, report. Nothing is extracted.
 //! Frame and unit: profiles in the sensor's x-z plane, cloud in the base frame or in the axis'; mm.
 
-use super::calibrate::ball::listed_poses;
+use super::calibrate::profile_sensor::listed_poses;
 use super::scan::products;
 use super::scan::refined::{Refined, refine};
 use super::scan::report::{FORMAT, Profiled, ScanReport, Spent};
 use super::scan::scan_folder;
 use super::scan::seen::Seen;
-use crate::calibrate::ball::missing::{Heights, marked};
+use crate::calibrate::profile_sensor::missing::{Heights, marked};
 use crate::fault::{Fault, Result};
 use crate::files::Lock;
 use crate::geometry::{Base, Camera, CountUnit, Flange, Mat3, Rigid, Sensor, Vec3};

@@ -64,6 +64,11 @@ const READ: [(&str, &str, bool); 31] = [
         false,
     ),
     (
+        "x.csv",
+        "calibrate profile-hand-eye {}/x.csv --poses {}/recording/poses.json --station {}/station --plane",
+        false,
+    ),
+    (
         "x.json",
         "calibrate profile-hand-eye {}/p.csv --poses {}/recording/poses.json --ball-diameter-mm 20 --evaluate \
          {}/x.json",

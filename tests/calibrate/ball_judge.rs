@@ -6,10 +6,10 @@ use crate::common::judge::{Trial, between, gauss, gauss3, judge};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
-use sheetlight::calibrate::ball::evaluate::evaluate;
-use sheetlight::calibrate::ball::options::BallOptions;
-use sheetlight::calibrate::ball::options::Side;
-use sheetlight::calibrate::ball::solve::{BallFit, solve};
+use sheetlight::calibrate::profile_sensor::ball::evaluate::evaluate;
+use sheetlight::calibrate::profile_sensor::ball::options::BallOptions;
+use sheetlight::calibrate::profile_sensor::ball::options::Side;
+use sheetlight::calibrate::profile_sensor::ball::solve::{BallFit, solve};
 use sheetlight::geometry::{Base, Flange, Mat3, Rigid, Sensor, Vec3, exp, log};
 use sheetlight::recording::profiles::Profile;
 
@@ -108,13 +108,13 @@ fn the_sensors_pose_comes_with_its_true_sigma_and_near_the_bound() {
         let rig = rig(&mut Pcg64::seed_from_u64(*k));
         let (profiles, poses) = scans(rng, &rig, 20, [-14.0, 14.0], 0.35, *point, *robot);
         let found = solve(&profiles, &poses, &BallOptions::new(2.0 * RADIUS)).unwrap();
-        Trial::new(error(&found, &rig), &found.covariance, &bound(&rig, &poses, *point, *robot))
+        Trial::new(error(&found, &rig), &found.fit.covariance, &bound(&rig, &poses, *point, *robot))
     });
 }
 
 fn error(found: &BallFit, rig: &Rig) -> DVector<f64> {
-    let w = log(&(found.flange_from_sensor.rotation * rig.sensor.rotation.transpose()));
-    let t = found.flange_from_sensor.translation - rig.sensor.translation;
+    let w = log(&(found.fit.flange_from_sensor.rotation * rig.sensor.rotation.transpose()));
+    let t = found.fit.flange_from_sensor.translation - rig.sensor.translation;
     let p = found.ball - rig.ball;
     DVector::from_iterator(9, t.iter().chain(w.iter()).chain(p.iter()).copied())
 }
@@ -134,7 +134,7 @@ fn few_and_noisy_profiles_come_with_an_honest_sigma() {
         let (profiles, poses) = scans(rng, &rig, count, [-14.0, 14.0], 0.35, 0.02, 0.15);
         let found = solve(&profiles, &poses, &BallOptions::new(2.0 * RADIUS)).unwrap();
         let e = error(&found, &rig);
-        let share = (0..6).map(|i| e[i] * e[i] / found.covariance[(i, i)]).sum::<f64>() / 6.0;
+        let share = (0..6).map(|i| e[i] * e[i] / found.fit.covariance[(i, i)]).sum::<f64>() / 6.0;
         sum += share;
         by[case] = (by[case].0 + share, by[case].1 + 1.0);
     }
@@ -176,7 +176,7 @@ fn the_side_is_found_stated_or_refused() {
         let (profiles, poses) = scans(rng, &rig, 20, heights, 0.35, 0.02, 0.02);
         let found = solve(&profiles, &poses, &BallOptions::new(2.0 * RADIUS)).unwrap();
         assert_eq!(found.side, side, "seed {k}, margin {}", found.side_margin);
-        assert!((found.flange_from_sensor.translation - rig.sensor.translation).norm() < 0.2);
+        assert!((found.fit.flange_from_sensor.translation - rig.sensor.translation).norm() < 0.2);
         let stated = BallOptions { side: Some(side), ..BallOptions::new(2.0 * RADIUS) };
         let again = solve(&profiles, &poses, &stated).unwrap();
         assert!((again.ball - found.ball).norm() < 1e-3);
@@ -192,7 +192,7 @@ fn turns_about_nothing_are_refused_and_a_wrong_pair_is_named() {
     let (profiles, mut poses) = scans(rng, &rig, 20, [-14.0, 14.0], 0.35, 0.02, 0.02);
     poses[7].translation.x += 3.0;
     let found = solve(&profiles, &poses, &BallOptions::new(2.0 * RADIUS)).unwrap();
-    let out: Vec<usize> = (0..20).filter(|&i| !found.profiles[i].used).collect();
+    let out: Vec<usize> = (0..20).filter(|&i| !found.fit.profiles[i].used).collect();
     assert_eq!(out, [7]);
     assert!(solve(&profiles, &poses[1..], &BallOptions::new(2.0 * RADIUS)).is_err());
     assert!(solve(&profiles, &poses, &BallOptions::new(RADIUS)).is_err(), "a wrong diameter");

@@ -396,6 +396,84 @@ fn a_profile_sensor_is_calibrated_from_files() {
     assert_eq!(own["profiles"].as_array().unwrap().len(), 16);
 }
 
+#[test]
+fn a_profile_sensor_is_calibrated_from_files_of_a_plate() {
+    use sheetlight::geometry::{Base, Flange, Rigid, Sensor, Vec3, exp};
+    let dir = tempfile::tempdir().unwrap();
+    let sensor: Rigid<Flange, Sensor> = Rigid::from_vectors(&Vec3::new(0.3, -1.2, 0.4), Vec3::new(40.0, -25.0, 90.0));
+    let (normal, middle) = (Vec3::new(0.1, -0.05, 1.0).normalize(), Vec3::new(500.0, -120.0, 60.0));
+    // 16 profiles, each tilted by as many rad as `size` says. The sensor looks down.
+    let scanned = |name: &str, size: &dyn Fn(u32) -> f64| {
+        let folder = dir.path().join(name);
+        std::fs::create_dir(&folder).unwrap();
+        let mut poses = String::from("# convention: denso\nframe,x,y,z,rx,ry,rz\n");
+        for i in 0..16u32 {
+            let (a, tilt) = (f64::from(i), size(i));
+            let turn = exp(&Vec3::new(std::f64::consts::PI, 0.0, 0.0))
+                * exp(&Vec3::new(tilt * (1.3 * a).sin(), tilt * (1.3 * a).cos(), 0.0));
+            let place = middle + Vec3::new(20.0 * a.sin(), 30.0 * (1.7 * a).cos(), 0.0);
+            let from_sensor: Rigid<Base, Sensor> =
+                Rigid::new(turn, place - turn * Vec3::new(0.0, 0.0, 150.0 + 15.0 * (0.9 * a).sin()));
+            let mut rows = String::from("x,z\n");
+            for k in 0..120u32 {
+                let x = f64::from(k) / 3.0 - 20.0;
+                let from = from_sensor.point(&Vec3::new(x, 0.0, 0.0));
+                let z = (middle - from).dot(&normal) / (turn * Vec3::z()).dot(&normal);
+                // A table lies beside the plate.
+                rows += &format!("{x:.4},{:.4}\n", if k < 10 * (i % 4) { z + 9.0 } else { z });
+            }
+            std::fs::write(folder.join(format!("{i}.csv")), rows).unwrap();
+            let flange: Rigid<Base, Flange> = from_sensor * sensor.inverse();
+            let n = sheetlight::robot::Convention::Denso.write(&flange);
+            poses += &format!("{i},{:.5},{:.5},{:.5},{:.5},{:.5},{:.5}\n", n[0], n[1], n[2], n[3], n[4], n[5]);
+        }
+        let path = dir.path().join(format!("{name}.csv"));
+        std::fs::write(&path, poses).unwrap();
+        [folder, path].map(|p| text(&p).to_owned())
+    };
+    let station = text(&dir.path().join("station")).to_owned();
+    sheetlight(&["station", "new", "--station", &station]);
+    let command = |[profiles, poses]: &[String; 2], more: &[&str]| -> Vec<String> {
+        let args = [&["calibrate", "profile-hand-eye", profiles, "--poses", poses], more].concat();
+        args.into_iter().map(str::to_owned).collect()
+    };
+    let run = |args: Vec<String>| -> Value {
+        serde_json::from_str(&sheetlight(&args.iter().map(String::as_str).collect::<Vec<_>>())).unwrap()
+    };
+    let fails = |args: Vec<String>| sheetlight_fails(&args.iter().map(String::as_str).collect::<Vec<_>>());
+    let tilted = scanned("tilted", &|i| 0.25 * f64::from(i % 4));
+    let found = run(command(&tilted, &["--plane", "--station", &station, "--json"]));
+    let (mm, deg) = apart(&found["value"], &serde_json::to_value(sensor.to_rows().to_vec()).unwrap());
+    assert!(mm < 0.02 && deg < 0.01, "{mm} mm, {deg} degrees");
+    let figures = &found["quality"]["figures"];
+    assert!((figures["plane_normal_z"].as_f64().unwrap() - normal.z).abs() < 1e-5, "{figures}");
+    assert!((figures["plane_offset_mm"].as_f64().unwrap() - normal.dot(&middle)).abs() < 0.02, "{figures}");
+    assert_eq!(found["quality"]["verdict"], "good", "{found}");
+    assert!(Path::new(&station).join("calibration/profile_hand_eye.html").exists());
+    // The stored transform put to the test, and one that is 2 mm off.
+    let stored = Path::new(&station).join("calibration/profile_hand_eye.json");
+    let mut moved = sensor.to_rows();
+    moved[3] += 2.0;
+    let theirs = dir.path().join("theirs.json");
+    std::fs::write(&theirs, serde_json::json!({ "flange_T_sensor": moved.to_vec() }).to_string()).unwrap();
+    let rms = |transform: &Path| {
+        let judged = run(command(&tilted, &["--plane", "--evaluate", text(transform), "--json"]));
+        assert_eq!(judged["profiles"].as_array().unwrap().len(), 16);
+        judged["rms_mm"].as_f64().unwrap()
+    };
+    assert!(rms(&stored) < 0.01 && rms(&theirs) > 0.3, "{} {}", rms(&stored), rms(&theirs));
+    // Not tilted: refused with what is missing, and the stored record stays.
+    let before = std::fs::read(&stored).unwrap();
+    let (code, said) = fails(command(&scanned("flat", &|_| 0.0), &["--plane", "--station", &station]));
+    assert!(code == 1 && said.contains("at the same angle") && said.contains("next step: tilt the sensor"), "{said}");
+    assert_eq!(std::fs::read(&stored).unwrap(), before);
+    // One target, and a side of the ball only.
+    for wrong in [&["--ball-diameter-mm", "30", "--plane"][..], &[], &["--plane", "--side", "plus"]] {
+        let (code, said) = fails(command(&tilted, &[wrong, &["--station", &station]].concat()));
+        assert!(code == 2, "{wrong:?}: {said}");
+    }
+}
+
 /// Robot and board poses from other programs, in two notations, the robot scattering by 2 mm and 1 degree: refused as
 /// badly determined, but the transform is said; with a good robot it is stored.
 #[test]

@@ -20,6 +20,7 @@ mod legacy_charuco;
 mod mixed_sets;
 mod notations;
 mod photographs;
+mod plane_judge;
 mod pointer_judge;
 mod second_look;
 mod second_look_commands;

@@ -4,6 +4,7 @@
 
 use super::circle::circle;
 use super::options::BallOptions;
+use crate::calibrate::profile_sensor::ranges::paired;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Mat3, Rigid, Sensor, Vec3};
 use crate::recording::profiles::Profile;
@@ -75,11 +76,7 @@ pub fn evaluate(
     o: &BallOptions,
 ) -> Result<Evaluation> {
     o.check()?;
-    if profiles.len() != poses.len() || profiles.is_empty() {
-        return Err(Fault::input(format!("{} profiles and {} poses", profiles.len(), poses.len()))
-            .cause("a profile or a pose is missing")
-            .next("give one pose a profile, in the same order"));
-    }
+    paired(profiles, poses)?;
     let radius = o.diameter / 2.0;
     let mut points = Vec::new();
     let mut of: Vec<(String, std::ops::Range<usize>)> = Vec::new();

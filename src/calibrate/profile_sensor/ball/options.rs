@@ -1,8 +1,9 @@
 //! In: a user's settings for the ball calibration. Out: the checked settings.
 //! Frame and unit: mm.
 
-use super::missing::Heights;
-use crate::fault::{Fault, Result};
+use crate::calibrate::profile_sensor::missing::Heights;
+use crate::calibrate::profile_sensor::ranges::in_ranges;
+use crate::fault::Result;
 
 /// On which side of the profile plane (y = 0 of the sensor) the ball's centre lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -62,19 +63,12 @@ impl BallOptions {
     }
     /// Refuses values outside the ranges stated at the fields.
     pub fn check(&self) -> Result<()> {
-        let ranges = [
+        in_ranges(&[
             ("diameter", self.diameter, 1.0, 1000.0),
             ("gate_mm", self.gate_mm, 0.001, 10.0),
             ("gate", self.gate, 12.0, 1000.0),
             ("clear", self.clear, 9.0, 1000.0),
             ("min_profiles", self.min_profiles as f64, 6.0, 1000.0),
-        ];
-        match ranges.iter().find(|(_, v, low, high)| !(low..=high).contains(&v)) {
-            Some((name, v, low, high)) => {
-                Err(Fault::usage(format!("{name} is {v}, {low} to {high} is allowed"))
-                    .next("choose a value in that range"))
-            }
-            None => Ok(()),
-        }
+        ])
     }
 }

@@ -3,6 +3,6 @@
 
 mod circle;
 pub mod evaluate;
-pub mod missing;
 pub mod options;
+mod rows;
 pub mod solve;

@@ -9,7 +9,7 @@ use crate::solve::{ConsensusOptions, LmOptions, Loss, Problem, Residuals, consen
 
 /// A profile as a measurement: centre x, z and radius of the circle. The information matrix holds for a point
 /// variance of 1 mm².
-pub(in crate::calibrate) struct Circle {
+pub struct Circle {
     pub value: Vec3,
     pub information: Mat3,
     /// The profile's points on the ball.
@@ -44,7 +44,7 @@ impl Problem for CircleFit<'_> {
 }
 
 /// Fits the circle that most points of a profile lie on; its radius may not exceed the ball's.
-pub(in crate::calibrate) fn circle(profile: &Profile, radius: f64, o: &BallOptions) -> Result<Circle> {
+pub fn circle(profile: &Profile, radius: f64, o: &BallOptions) -> Result<Circle> {
     let p = &profile.points;
     let options = ConsensusOptions { threshold: o.gate_mm, max_draws: 4000, seed: o.seed, ..Default::default() };
     let found = consensus(
