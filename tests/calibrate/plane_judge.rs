@@ -417,3 +417,17 @@ fn many_profiles_are_solved_in_seconds() {
     let robot = found.fit.robot_sigma / c.robot_mm;
     assert!(worst < 4.0 && (0.7..1.4).contains(&robot), "{worst} sigmas, {robot}, {e}");
 }
+
+/// Poses in another order: nothing is stated that is wrong.
+#[test]
+fn poses_that_belong_to_other_profiles_are_refused() {
+    for k in 0..6 {
+        let rng = &mut Pcg64::seed_from_u64(300 + k);
+        let c = quiet(rng);
+        let looks = looks(rng, &c, 20, 0.7);
+        let (profiles, mut poses) = scans(rng, &c, &looks);
+        poses.rotate_left(1 + k as usize);
+        let words = said(solve(&profiles, &poses, &PlaneOptions::default()));
+        assert!(words.contains("profiles and poses do not belong together"), "set {k}: {words}");
+    }
+}

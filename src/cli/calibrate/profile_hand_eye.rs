@@ -44,7 +44,7 @@ pub struct Args {
     #[arg(long)]
     plane: bool,
     /// Side of the ball's centre: plus (y > 0 of the sensor, y = z × x) or minus [default: from the data]
-    #[arg(long, requires = "ball_diameter_mm", value_parser = crate::cli::terminal::arguments::parse::<Side>)]
+    #[arg(long, conflicts_with = "plane", value_parser = crate::cli::terminal::arguments::parse::<Side>)]
     side: Option<Side>,
     /// z that means "not measured", mm; values that are not finite are always skipped
     #[arg(long, value_name = "Z", allow_negative_numbers = true)]
@@ -102,8 +102,8 @@ fn put_to_the_test(args: &Args, transform: &Path, target: &ProfileTarget, consol
 
 fn on_ball(found: &Evaluation, diameter: f64) -> String {
     let mut text = format!(
-        "the profiles' points lie on one ball of {diameter:.3} mm to {:.4} mm rms; with the diameter left free on one of \
-         {:.3} mm to {:.4} mm\n",
+        "the profiles' points lie on one ball of {diameter:.3} mm to {:.4} mm rms; with the diameter left free on one \
+         of {:.3} mm to {:.4} mm\n",
         found.rms, found.free_diameter, found.free_rms
     );
     text += &format!("ball in the base: {:.3} {:.3} {:.3} mm\n", found.ball.x, found.ball.y, found.ball.z);

@@ -41,6 +41,8 @@ pub struct PlaneFit {
 const ROUGH: [f64; 2] = [0.3, 0.0035];
 /// The robot's noise before it is estimated: 0.05 mm and 0.02 degrees.
 const USUAL: [f64; 2] = [0.05, 0.00035];
+/// Scatter of the robot's position beyond which something else is wrong, mm.
+const STRANGE_MM: f64 = 1.0;
 /// Profiles that the robot's noise is estimated from while some are still excluded: they tell it to 7 %.
 const MOST: usize = 100;
 /// Rounds in which a profile may change to another of its lines.
@@ -115,21 +117,21 @@ pub fn solve(profiles: &[Profile], poses: &[Rigid<Base, Flange>], o: &PlaneOptio
     let minima = minima(&scene.data(&choice))?;
     let mut state = minima[0];
     choice = scene.nearest_lines(&state);
-    for _ in 0..ROUNDS {
+    let mut rounds = 0;
+    loop {
         let data = scene.data(&choice);
         let Some(solution) = from(&data, &state) else {
             return Err(undetermined(&data.items, &scene.names(0..data.items.len()), &state, &usual(&data.items)));
         };
         state = solution.solved.state;
         let better = scene.nearest_lines(&state);
-        if better == choice {
+        rounds += 1;
+        // A wrong profile may change between two of its lines for ever.
+        if better == choice || rounds == ROUNDS {
             return finished(&scene, &data, solution, &minima[1..]);
         }
         choice = better;
     }
-    Err(Fault::refused("the profiles do not agree on one plate")
-        .cause("they show several plates, one behind the other")
-        .next("cover everything but the plate, or scan where only the plate is in view"))
 }
 
 /// The minima from all starts, the best first; at least one.
@@ -333,6 +335,11 @@ fn undetermined(items: &[Item<'_, Line>], names: &[&str], s: &State, noise: &Noi
     let normals: Vec<Vec3> = items.iter().map(|i| i.pose.rotation.transpose() * s.normal).collect();
     let next = next(items, names, s, noise, &known);
     let open = open.map_or_else(String::new, |w| format!(": not {w}"));
+    if noise.robot[0] > STRANGE_MM {
+        return Fault::refused(format!("the profiles agree on one plate to {:.1} mm only{open}", noise.robot[0]))
+            .cause("profiles and poses do not belong together, the poses are in another convention, or the plate moved")
+            .next("check the order of the profiles, and the convention and unit of the poses");
+    }
     Fault::refused(format!("the sensor's pose on the flange is not determined by these profiles{open}"))
         .cause(cause(&normals))
         .next(format!("tilt the sensor against the plate by angles of several sizes about two axes{}", advice(&next)))
