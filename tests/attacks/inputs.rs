@@ -33,7 +33,7 @@ fn take_away(path: &Path) {
 
 /// A file that is read (`{}` stands for the bench's folder), and the command that reads it; where the file may be
 /// missing, or is read past, the command may succeed.
-const READ: [(&str, &str, bool); 31] = [
+const READ: [(&str, &str, bool); 32] = [
     ("x", "scan {}/recording --station {}/station --out {}/o --ambient {}/x --on cpu", false),
     ("x.json", "scan --raw 320x240:gray8 --poses {}/x.json --station {}/station --out {}/o --on cpu", false),
     ("x", "scan {}/recording --station {}/station --out {}/o --truth {}/x --on cpu", false),

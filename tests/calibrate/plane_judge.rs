@@ -398,6 +398,11 @@ fn a_transform_from_elsewhere_is_judged_by_the_plate() {
     assert!(truth.rms < 0.08 && (truth.line_rms - 0.02).abs() < 0.004, "{truth:?}");
     assert!(truth.plane.distance(&c.middle).abs() < 0.1 && truth.plane.normal.dot(&c.normal) > 0.99999);
     assert!(off.rms > 4.0 * truth.rms && turned.rms > 4.0 * truth.rms);
+    // Two thirds of a profile on the table beside the plate: its part on the plate counts.
+    let mut beside = profiles.clone();
+    beside[4].points.iter_mut().take(105).for_each(|q| q[1] += 12.0);
+    let found = evaluate(&beside, &poses, &c.sensor, &PlaneOptions::default()).unwrap();
+    assert!(found.rms < 1.2 * truth.rms && found.profiles[4].1 < 60, "{found:?}");
     // Profiles of one place span no plane.
     let same = vec![profiles[0].clone(); 5];
     let words = evaluate(&same, &vec![poses[0]; 5], &c.sensor, &PlaneOptions::default()).unwrap_err().to_string();
