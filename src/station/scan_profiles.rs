@@ -166,6 +166,7 @@ pub fn scan_profiles(profiles: &Path, moved: &Moved, rig: &Rig, options: &Profil
     };
     let text = serde_json::to_string_pretty(&report).expect("plain data");
     crate::files::write(&part.join("scan.json"), text.as_bytes())?;
+    #[cfg(feature = "pages")]
     super::judge::page::save(&part, None, &[])?;
     folder.commit()?;
     Ok(report)
