@@ -13,8 +13,8 @@ use crate::stages::peak::found::Peak;
 const BLUR: f32 = 0.25;
 /// Variance of the light's logarithm over that of the centre in the stripe's sigmas, for the same fit. Fits of three
 /// unknowns have 0.75 for read noise, 1.5 for shot noise and up to 4.6 for speckle. On even surfaces 2 to 2.8 was
-/// measured, and half as much again is held to be noise, so that it seldom counts as a slope.
-const NOISE: f32 = 4.0;
+/// measured, and twice as much is held to be noise, so that it seldom counts as a slope.
+const NOISE: f32 = 5.0;
 /// The slope is that over the stripe's sigma to both sides, and at least over this, px.
 const LEAST_PX: f32 = 1.5;
 
