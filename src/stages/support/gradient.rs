@@ -26,7 +26,8 @@ pub(super) fn shifts(peaks: &[Peak], line: &Line, width_px: f32) -> impl Iterato
 }
 
 /// Size of the slope of the light's logarithm along the stripe at the `i`-th peak, 1/px, without what noise makes of
-/// an even surface; 0 where a neighbour's fit states no finite sigma. A straight line is fitted by least squares, with less weight for farther neighbours.
+/// an even surface; 0 where a neighbour's fit states no finite sigma. A straight line is fitted by least squares, with
+/// less weight for farther neighbours.
 fn slope(peaks: &[Peak], line: &Line, i: usize, width_px: f32) -> f32 {
     let reach = width_px.max(LEAST_PX);
     let sides = [-1, 1].into_iter().flat_map(|step| line.beside(i, step, near_px(width_px)));
