@@ -35,7 +35,8 @@ fn scene(degrees: f64) -> String {
     text
 }
 
-/// The block whose edge is nearest to a place, that edge's distance in the plane, and the distance from the true surface.
+/// The block whose edge is nearest to a place, that edge's distance in the plane, and the distance from the true
+/// surface.
 fn judged(at: &Vec3, degrees: f64) -> (usize, f64, f64) {
     let (sin, cos) = degrees.to_radians().sin_cos();
     // How far beyond a block's outline; negative inside.
