@@ -15,6 +15,8 @@ ROOT = Path(__file__).resolve().parent.parent
 IMAGES = ROOT / "docs" / "images"
 sys.path.insert(0, str(ROOT / "tests" / "web"))
 
+from browser import Browser, levels
+
 # The commands of docs/getting-started.md, as far as pictures come of them.
 COMMANDS = """
 simulate --out sim --set all --seed 3
@@ -29,8 +31,6 @@ find scans/board --recipe {root}/data/recipes/led.toml --station cell3 --out pos
 
 def report(page, picture):
     """A picture of a page from its first plot on."""
-    from browser import Browser, levels
-
     if not Browser.there():
         print(f"*** SKIPPED: no chromium and chromedriver here: {picture.name} stays as it is ***")
         return
@@ -51,7 +51,7 @@ def main():
                 subprocess.run([program, *line.split(), "--quiet"], cwd=folder, check=True)
         board = folder / "scans" / "board"
         overlays = sorted((board / "overlays").glob("*.png"))
-        shutil.copyfile(folder / "pose.png", IMAGES / "guide-found.png")
+        (IMAGES / "guide-found.png").write_bytes(levels((folder / "pose.png").read_bytes()))
         shutil.copyfile(overlays[len(overlays) // 2 - 1], IMAGES / "guide-overlay.png")
         report(folder / "cell3" / "calibration" / "camera.html", IMAGES / "guide-report.png")
         # A year of scans of docs/archives.md.

@@ -3,15 +3,14 @@ text, screenshots, console. It speaks the WebDriver protocol over plain HTTP wit
 Frame and unit: CSS pixels, seconds."""
 
 import base64
+import io
 import json
 import re
 import shutil
-import struct
 import subprocess
 import threading
 import urllib.error
 import urllib.request
-import zlib
 
 import waits
 from waits import PATIENCE
@@ -158,38 +157,15 @@ class Browser:
             self.driver.wait(PATIENCE)
 
 
-def levels(png, shades=48):
-    """A PNG of 8 bits per channel with fewer levels, so that its file is small."""
-    place, header, data = 8, None, b""
-    while place < len(png):
-        length, kind = struct.unpack(">I4s", png[place:place + 8])
-        if kind == b"IHDR":
-            header = png[place + 8:place + 8 + length]
-        elif kind == b"IDAT":
-            data += png[place + 8:place + 8 + length]
-        place += 12 + length
-    width, height, bits, colour = struct.unpack(">IIBB", header[:10])
-    assert bits == 8 and colour in (2, 6), (bits, colour)
-    n = 4 if colour == 6 else 3
-    raw, rows, before = zlib.decompress(data), [], bytearray(width * n)
-    for y in range(height):
-        at = y * (width * n + 1)
-        row = unfilter(raw[at], bytearray(raw[at + 1:at + 1 + width * n]), before, n)
-        rows.append(row)
-        before = row
-    step = 256 // shades
-    table = bytes(min(255, (v // step) * step + step // 2) if 8 < v < 248 else v for v in range(256))
-    out = bytearray()
-    for row in rows:
-        rgb = bytearray(3 * width)
-        for c in range(3):
-            rgb[c::3] = row[c::n].translate(table)
-        # PNG filter Sub: each byte minus the same channel of its left neighbour. Uniform areas become zeros.
-        less = bytearray(rgb[:3]) + bytearray((a - b) & 255 for a, b in zip(rgb[3:], rgb[:-3]))
-        out += b"\x01" + less
-    chunk = lambda kind, body: struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
-    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(bytes(out), 9)) + chunk(b"IEND", b"")
+def levels(png):
+    """A PNG with a palette of 256 colours, so that its file is small. Only who draws the documents' pictures needs
+    Pillow."""
+    from PIL import Image
+
+    out = io.BytesIO()
+    picture = Image.open(io.BytesIO(png)).convert("RGB").quantize(256, method=Image.Quantize.MEDIANCUT)
+    picture.save(out, "PNG", optimize=True)
+    return out.getvalue()
 
 
 def unfilter(kind, row, before, n):
