@@ -122,6 +122,6 @@ fn add(writer: &mut ProfileWriter, shot: &Paired) -> Result<()> {
         Some(Stand::Robot(pose)) => Some(pose),
         _ => None,
     };
-    let rows = shot.picture.profiles.iter().flatten();
-    rows.map(|row| writer.add(row, pose)).collect()
+    let mut rows = shot.picture.profiles.iter().flatten();
+    rows.try_for_each(|row| writer.add(row, pose))
 }

@@ -25,10 +25,10 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 #[command(group = clap::ArgGroup::new("target").required(true).args(["ball_diameter_mm", "plane"]))]
 #[command(after_help = "Examples:
-  sheetlight calibrate profile-hand-eye profiles/ --poses BALL.LS \
+  sheetlight calibrate profile-hand-eye profiles/ --poses BALL.LS \\
       --ball-diameter-mm 30 --station cell3
   sheetlight calibrate profile-hand-eye profiles/ --poses PLATE.LS --plane --station cell3
-  sheetlight calibrate profile-hand-eye profiles/ --poses BALL.LS \
+  sheetlight calibrate profile-hand-eye profiles/ --poses BALL.LS \\
       --ball-diameter-mm 30 --evaluate theirs.json
 Guide: docs/calibration.md, Line-profile sensor")]
 pub struct Args {

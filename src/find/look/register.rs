@@ -61,6 +61,8 @@ const STARTS: [[f64; 2]; 5] = [[0.0, 0.0], [2.0, 0.0], [-2.0, 0.0], [0.0, 2.0], 
 /// Turns about the vertical from which the best path continues, rad: rows of pins have local optima a third of a degree
 /// to both sides.
 const TURNS: [f64; 3] = [-6e-3, 0.0, 6e-3];
+/// Number of times that a better optimum is continued from with these turns: it may have better ones beside it again.
+const FARTHER: usize = 4;
 /// Number of first rounds that use only the pieces in cells: from afar these attract over a wider range.
 const COARSE: i32 = 15;
 /// Search distance for a partner in the last rounds, mm.
@@ -171,15 +173,24 @@ fn best_of(ways: &[Way], pieces: usize) -> Option<usize> {
     (0..ways.len()).min_by(|&a, &b| left(&ways[a]).total_cmp(&left(&ways[b])))
 }
 
-/// The best of the paths from several starts, continued from there with several turns.
+/// The best of the paths from several starts, continued from there with several turns while that finds a better one.
 fn fit(first: &Surface, moving: &[Piece], centre: &Vec3) -> Option<Fit> {
     let start = |[x, y]: [f64; 2]| Vector6::new(x, y, 0.0, 0.0, 0.0, 0.0);
     let mut ways: Vec<Way> = STARTS.iter().filter_map(|&s| walk(first, moving, centre, start(s), COARSE)).collect();
     ways.extend(walk(first, moving, centre, start([0.0; 2]), 0));
-    let best = ways[best_of(&ways, moving.len())?].step;
-    let turned = |turn: f64| Vector6::new(best[0], best[1], best[2], 0.0, 0.0, turn);
-    ways.extend(TURNS.iter().filter_map(|&turn| walk(first, moving, centre, turned(turn), 0)));
-    let way = ways.swap_remove(best_of(&ways, moving.len())?);
+    let mut best = best_of(&ways, moving.len())?;
+    let mut turn = 0.0;
+    for _ in 0..FARTHER {
+        let from = ways[best].step;
+        let turned = |more: f64| Vector6::new(from[0], from[1], from[2], 0.0, 0.0, turn + more);
+        ways.extend(TURNS.iter().filter_map(|&more| walk(first, moving, centre, turned(more), 0)));
+        let now = best_of(&ways, moving.len())?;
+        if now == best {
+            break;
+        }
+        (best, turn) = (now, ways[now].step[5]);
+    }
+    let way = ways.swap_remove(best);
     let Way { step, inverse, pairs, sigma } = way;
     // Pieces of one shot share its pose's error, in either scan. Pieces of one place share the effect of its slope and
     // its edges on a stripe's centre.
