@@ -27,7 +27,7 @@ use std::time::Duration;
   sheetlight live --camera ffmpeg:/dev/video0 --station cell3 --points > profiles.jsonl
   camera-tool --raw | \\
       sheetlight live --raw 4096x3072:gray12le --station cell3 --points > profiles.jsonl
-  sheetlight live --camera gige://first --station cell3 --mcap - | sheetlight-ros2 -
+  sheetlight live --camera gige://first --station cell3 --mcap profiles.mcap
 All options: sheetlight help live
 Guide: docs/live.md")]
 pub struct Args {

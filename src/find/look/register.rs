@@ -63,6 +63,10 @@ const STARTS: [[f64; 2]; 5] = [[0.0, 0.0], [2.0, 0.0], [-2.0, 0.0], [0.0, 2.0], 
 const TURNS: [f64; 3] = [-6e-3, 0.0, 6e-3];
 /// Number of times that a better optimum is continued from with these turns: it may have better ones beside it again.
 const FARTHER: usize = 4;
+/// Least scale of the distances in the first round, mm; it is reduced by a third each round.
+const WIDE: f64 = 0.5;
+/// Number of last rounds with the distances' own scale.
+const LAST: i32 = 5;
 /// Number of first rounds that use only the pieces in cells: from afar these attract over a wider range.
 const COARSE: i32 = 15;
 /// Search distance for a partner in the last rounds, mm.
@@ -150,7 +154,10 @@ fn walk(first: &Surface, moving: &[Piece], centre: &Vec3, mut step: Vector6, coa
             return None;
         }
         let mut sizes: Vec<f64> = pairs.iter().map(|p| p.off.abs()).collect();
-        let sigma = crate::solve::robust_scale(&mut sizes, 1).max(1e-4);
+        // Most pieces are flat and lie on one another from the start. The few that show a shift are outliers to their
+        // scatter, so a larger scale is reduced round by round.
+        let wide = WIDE * 0.65f64.powi(round);
+        let sigma = crate::solve::robust_scale(&mut sizes, 1).max(if round + LAST < ROUNDS { wide } else { 1e-4 });
         let (mut normal, mut right) = (known(), Vector6::zeros());
         right -= known() * step;
         for p in &pairs {
