@@ -29,8 +29,8 @@
 //! **Features.** `cli` (default) is the command line with clap and indicatif, and turns all other features on. `bench`
 //! has the measurements of `sheetlight bench`, `gige` the cameras that speak GigE Vision, `folder` makes a folder a
 //! camera, and `cell` is the simulated cell. `pages` writes a scan's `index.html` and the reports of calibrations,
-//! `ros` writes scans as MCAP files with ROS 2 messages. `web` is the operator's screen. A program that uses the library sets
-//! `default-features = false` and chooses what it needs.
+//! `ros` writes scans as MCAP files with ROS 2 messages. `web` is the operator's screen. A program that uses the
+//! library sets `default-features = false` and chooses what it needs.
 //!
 //! The modules are listed in the order of their floors; each imports only from floors above it in this list
 //! (ARCHITECTURE.md, enforced by tests/floors.rs).
