@@ -10,7 +10,7 @@ pub const NODE: &str = "sheetlight";
 #[derive(Clone, Debug)]
 pub struct Place {
     pub domain: u32,
-    /// Begins with `/`; `/` alone is none.
+    /// Namespace with a leading `/`. `/` means that there is no namespace.
     pub namespace: String,
     /// The identifier of the session, hexadecimal.
     pub session: String,

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 /// Time between two looks at whether to end.
 const TICK: Duration = Duration::from_millis(50);
-/// A longer pause is told.
+/// A message on the terminal announces a longer pause.
 const LONG: Duration = Duration::from_secs(30);
 
 /// The clock of a file that is played.

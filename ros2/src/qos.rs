@@ -11,7 +11,7 @@ pub struct Qos {
     pub depth: usize,
 }
 
-/// Depth of rmw_zenoh where none is told; tokens do not name it.
+/// Depth that rmw_zenoh uses if a profile states none. Tokens do not contain it.
 const DEPTH: usize = 42;
 /// Most messages that are kept for later subscribers.
 const MOST: usize = 100;

@@ -59,7 +59,7 @@ pub struct Relay<'a> {
 }
 
 impl<'a> Relay<'a> {
-    /// `pace` is none for messages that are sent as they come.
+    /// Without `pace` messages are sent as they arrive.
     pub fn new(door: &'a mut Door, pace: Option<Pace>, delay: f64, stop: &'a dyn Fn() -> bool) -> Relay<'a> {
         let delay = Duration::from_secs_f64(delay);
         Relay {

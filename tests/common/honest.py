@@ -1,5 +1,5 @@
-"""In: the folder of the reference data's scorer, a cloud, the mesh of its true surface. Out: two lines, the shares of the
-points that lie within one and beyond three of their stated standard deviations. Frame and unit: base frame, mm.
+"""In: the folder of the reference data's scorer, a cloud, the mesh of its true surface. Out: two lines, the shares of
+the points that lie within one and beyond three of their stated standard deviations. Frame and unit: base frame, mm.
 
     python3 honest.py SCORER cloud.ply mesh.ply
 """

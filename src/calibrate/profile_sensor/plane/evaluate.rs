@@ -115,7 +115,7 @@ pub fn evaluate(
     })
 }
 
-/// The plane through points, wrong ones among them; or why there is none.
+/// The plane through points of which some are wrong. The error says why no plane was found.
 fn fitted(points: &[Vec3]) -> std::result::Result<Plane<Base>, &'static str> {
     let mean = points.iter().sum::<Vec3>() / points.len() as f64;
     let near: Vec<Vec3> = points.iter().map(|p| p - mean).collect();

@@ -58,7 +58,7 @@ impl Problem for LineFit<'_> {
     }
 }
 
-/// The lines of a profile, the one with most points first; or in words why there is none.
+/// The lines of a profile, the one with most points first. The error says why no line was found.
 pub fn lines(profile: &Profile, o: &PlaneOptions) -> Result<Vec<Line>, String> {
     let all = profile.points.len();
     let mut rest = profile.points.clone();
