@@ -149,16 +149,7 @@ impl PictureSource for Paced {
         let (id, host_ns) = (self.next, now_ns());
         self.next += 1;
         let image = self.images[(id % self.images.len() as u64) as usize].clone();
-        let picture = Picture {
-            image,
-            id,
-            device_ns: None,
-            host_ns,
-            exposure_ns: None,
-            count: None,
-            stand: None,
-            profiles: None,
-        };
+        let picture = Picture::arrived(image, id, host_ns);
         Event::Picture(Box::new(picture))
     }
 

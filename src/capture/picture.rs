@@ -36,6 +36,13 @@ pub struct Picture {
     pub profiles: Option<Vec<Vec<[f64; 2]>>>,
 }
 
+impl Picture {
+    /// A picture of which the source states nothing but its number and its arrival.
+    pub fn arrived(image: Image, id: u64, host_ns: u64) -> Picture {
+        Picture { image, id, device_ns: None, host_ns, exposure_ns: None, count: None, stand: None, profiles: None }
+    }
+}
+
 /// How far the numbers of pictures are comparable: what happened to the source before a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Numbering {

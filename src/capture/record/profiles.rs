@@ -2,12 +2,12 @@
 //! poses, as `scan-profiles` reads them.
 //! Frame and unit: docs/file-formats.md.
 
-use super::run::{GLANCE, ROOM, Recording};
+use super::run::{ROOM, Recording, next_shot};
 use super::space::Space;
 use crate::capture::account::Account;
 use crate::capture::feed::Fate;
 use crate::capture::pair::Paired;
-use crate::capture::stream::{Stream, Streamed};
+use crate::capture::stream::Stream;
 use crate::fault::{Fault, Result};
 use crate::files::Lock;
 use crate::recording::profiles::ProfileWriter;
@@ -61,16 +61,10 @@ pub fn record_profiles(
     let mut space = Space::of(folder);
     let mut full: Option<Fault> = None;
     let ended = loop {
-        stream.news().into_iter().for_each(|s| say(stream, Some(s)));
-        let shot = match stream.next(GLANCE) {
-            Streamed::Shot(shot) => shot,
-            Streamed::Quiet => {
-                say(stream, None);
-                continue;
-            }
-            Streamed::Ended(fault) => break fault,
+        let shot = match next_shot(stream, &mut say) {
+            Ok(shot) => shot,
+            Err(ended) => break ended,
         };
-        say(stream, None);
         if full.is_some() {
             stream.fate(Fate::Disk);
             continue;

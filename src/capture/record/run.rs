@@ -9,6 +9,7 @@ use super::super::stream::{Stream, Streamed};
 use super::backlog::{Handing, Recorded};
 use super::recorder::{Kept, Recorder};
 use super::space::Space;
+use crate::capture::pair::Paired;
 use crate::fault::{Fault, Result};
 use std::time::Duration;
 
@@ -58,16 +59,10 @@ pub fn record(
     let mut space = Space::of(recorder.folder());
     let mut full: Option<Fault> = None;
     let ended = loop {
-        stream.news().into_iter().for_each(|s| say(stream, Some(s)));
-        let shot = match stream.next(GLANCE) {
-            Streamed::Shot(shot) => shot,
-            Streamed::Quiet => {
-                say(stream, None);
-                continue;
-            }
-            Streamed::Ended(fault) => break fault,
+        let shot = match next_shot(stream, &mut say) {
+            Ok(shot) => shot,
+            Err(ended) => break ended,
         };
-        say(stream, None);
         if full.is_some() {
             stream.fate(Fate::Disk);
             continue;
@@ -94,6 +89,26 @@ pub fn record(
     };
     stream.news().into_iter().for_each(|s| say(stream, Some(s)));
     ended_so(stream, recorder, Vec::new(), full.or(ended))
+}
+
+/// The next shot; until it comes `say` receives news, and the account at intervals. The error is the fault that ended the
+/// stream, none if its end was requested.
+pub(super) fn next_shot(
+    stream: &mut Stream,
+    say: &mut impl FnMut(&Stream, Option<String>),
+) -> std::result::Result<Box<Paired>, Option<Fault>> {
+    loop {
+        stream.news().into_iter().for_each(|s| say(stream, Some(s)));
+        let next = stream.next(GLANCE);
+        match next {
+            Streamed::Shot(shot) => {
+                say(stream, None);
+                return Ok(shot);
+            }
+            Streamed::Quiet => say(stream, None),
+            Streamed::Ended(fault) => return Err(fault),
+        }
+    }
 }
 
 /// Completes a recording; `more` are excluded pictures that the stream does not know, `fault` ended it.

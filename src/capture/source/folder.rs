@@ -125,16 +125,7 @@ impl FolderCamera {
             Ok(image) if self.next == 0 || Format::of(&image) == self.format => {
                 let host_ns = now_ns();
                 let id = self.over(path);
-                let picture = Picture {
-                    image,
-                    id,
-                    device_ns: None,
-                    host_ns,
-                    exposure_ns: None,
-                    count: None,
-                    stand: None,
-                    profiles: None,
-                };
+                let picture = Picture::arrived(image, id, host_ns);
                 Some(Event::Picture(Box::new(picture)))
             }
             Ok(image) => {

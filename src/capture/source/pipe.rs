@@ -57,16 +57,7 @@ impl PictureSource for Pipe {
             Ok(Ok(Some((image, host_ns)))) => {
                 let id = self.came;
                 self.came += 1;
-                let picture = Picture {
-                    image,
-                    id,
-                    device_ns: None,
-                    host_ns,
-                    exposure_ns: None,
-                    count: None,
-                    stand: None,
-                    profiles: None,
-                };
+                let picture = Picture::arrived(image, id, host_ns);
                 Event::Picture(Box::new(picture))
             }
             Err(RecvTimeoutError::Timeout) => Event::Quiet,

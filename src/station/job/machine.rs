@@ -16,7 +16,7 @@ use crate::fault::{Fault, Gate, Kind, Result};
 use crate::find::insert::picture;
 use crate::find::{CutOff, LocateOptions, Recipe, Report, beyond_rim, locate};
 use crate::geometry::{Base, Flange, Rigid, Vec3};
-use crate::recording::Beam;
+use crate::recording::{self, Beam};
 use crate::rig::{Rig, hash_file, hash_text};
 use crate::robot::Convention;
 use crate::scan::{Where, parts_for};
@@ -104,14 +104,9 @@ impl<'a> Job<'a> {
                 .next("write [tool] with flange_from_tool = [16 numbers] (docs/robots.md)"));
         }
         crate::files::make_folder(&options.out)?;
-        let made_from = hash_text(
-            format!(
-                "{} {}",
-                hash_file(&options.recipe)?,
-                parts_for(&rig, &crate::recording::Motion::default()).fingerprint()
-            )
-            .as_bytes(),
-        );
+        // A job scans with the sensor on the robot.
+        let used = parts_for(&rig, &recording::Motion::default());
+        let made_from = hash_text(format!("{} {}", hash_file(&options.recipe)?, used.fingerprint()).as_bytes());
         let state = match JobState::load(&options.out)? {
             Some(state) => {
                 state.goes_on_with(&made_from).map_err(|e| e.at(options.out.display()))?;
