@@ -48,7 +48,7 @@ fn from_csv(text: &str, frames: usize) -> Result<Vec<Option<f64>>> {
     let bad = |number: u64, what: String| {
         Err(Fault::input(format!("line {number}: {what}"))
             .cause("a truncated or edited file, or one of another recording")
-            .next("write a header frame,count and a row for each frame of meta.json, counted from 0"))
+            .next("write a header frame,count and a row for each frame or profile, counted from 0"))
     };
     let mut rows = table(text, ',').into_iter();
     let header = rows.next().map(|r| r.cells.join(",").to_lowercase()).unwrap_or_default();
@@ -66,7 +66,7 @@ fn from_csv(text: &str, frames: usize) -> Result<Vec<Option<f64>>> {
             return bad(number, format!("'{line}' is not a frame's number and its count"));
         };
         if frame >= frames {
-            return bad(number, format!("frame {frame}, meta.json has {frames}"));
+            return bad(number, format!("frame {frame}, the last one is {}", frames.saturating_sub(1)));
         }
         if !seen.insert(frame) {
             return bad(number, format!("frame {frame} is there twice"));
@@ -114,7 +114,7 @@ mod tests {
             (r#"{"kind":"robot","carries":"part"}"#.into(), own, "", "a robot's"),
             (r#"{"kind":"robot","carries":"part"}"#.into(), plain, "", "was moved by a robot"),
             (file.clone(), plain, "count\n1\n", "a counts file has"),
-            (file.clone(), plain, "frame,count\n3,1\n", "meta.json has 3"),
+            (file.clone(), plain, "frame,count\n3,1\n", "the last one is 2"),
             (file.clone(), plain, "frame,count\n1,1\n1,2\n", "twice"),
             (file.clone(), plain, "frame,count\n1,nan\n", "is not a frame's number"),
             (linear(""), r#"{"laser":"a.png","count":1e300}"#, "", "at most"),
