@@ -983,7 +983,11 @@ export const TABLE = {
   "pointer": ["Zeiger", "激光指针", "ポインター"],
   "points": ["Punkte", "点", "点"],
   "poor": ["mäßig", "一般", "要注意"],
-  "profile hand-eye": ["Hand-Auge des Profilsensors", "轮廓传感器手眼", "プロファイルセンサのハンドアイ"],
+  "profile hand-eye": [
+    "Hand-Auge des Profilsensors",
+    "轮廓传感器手眼",
+    "プロファイルセンサのハンドアイ"
+  ],
   "queued": ["wartet", "排队", "待機"],
   "refused": ["abgelehnt", "拒绝", "却下"],
   "repeats": ["Wiederholungen", "重复次数", "繰り返し"],
