@@ -3,7 +3,7 @@
 # make test   everything, on software Vulkan where it can be had
 # make gentl  the GenTL producer, by which GenICam programs see a 3-D camera: target/release/sheetlight.cti
 # make opcua  the OPC UA server beside a station: target/release/sheetlight-opcua
-# make ros2   the sender of live messages to ROS 2: target/release/sheetlight-ros2
+# make ros2   live messages and a station's services for ROS 2: target/release/sheetlight-ros2
 # make bench  figures of this machine;  make bench-peers  side by side with OpenCV and numba
 
 CARGO ?= cargo
@@ -30,7 +30,8 @@ build:
 test: vulkan python cameras browser lint
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(if $(SHEETLIGHT_REQUIRE_GPU),,SHADER_TWIN_ALLOW_SKIP=1) \
 		$(CARGO) test --locked --package sheetlight --package shader-twin --package sheetlight-gentl -- --show-output
-	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(CARGO) test --locked --package sheetlight-opcua -- --show-output
+	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(CARGO) test --locked --package sheetlight-opcua \
+		--package sheetlight-registers -- --show-output
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(CARGO) test --locked --package sheetlight-ros2 -- --show-output
 
 # A toolchain without clippy says so and goes on.
@@ -46,7 +47,8 @@ lint: pages book
 	if $(CARGO) clippy --version >/dev/null 2>&1; then \
 		$(CARGO) clippy --locked --package sheetlight --package shader-twin --package sheetlight-gentl --all-targets \
 			-- -D warnings && \
-		$(CARGO) clippy --locked --package sheetlight-opcua --all-targets -- -D warnings && \
+		$(CARGO) clippy --locked --package sheetlight-opcua --package sheetlight-registers --all-targets \
+			-- -D warnings && \
 		$(CARGO) clippy --locked --package sheetlight-ros2 --all-targets -- -D warnings; \
 	else echo "clippy is not installed: skipped"; fi
 	$(CARGO) check --locked --package outside

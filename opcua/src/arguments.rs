@@ -2,8 +2,8 @@
 //! Frame and unit: mm.
 
 use crate::model::data::{RecipeIdExternal, RecipeIdInternal};
-use crate::registers::Ask;
 use opcua::types::{StatusCode, TryFromVariant, Variant, VariantScalarTypeId};
+use sheetlight_registers::Ask;
 
 /// Most characters of an identifier that a client gives to a job.
 pub const MOST_LETTERS: usize = 100;

@@ -7,10 +7,10 @@ use crate::machine::{End, Machine, State, Transition};
 use crate::model::data::{JobId, MeasId, PartId, ProductId, RecipeIdExternal, RecipeIdInternal, ResultId};
 use crate::model::ids::kind;
 use crate::outlet::Told;
-use crate::registers::{Ask, Job, Stage, is_name};
 use crate::results::{Order, Outcome};
 use crate::vision::{Guided, Refusal, Vision, error};
 use opcua::types::{DateTime, StatusCode, TryFromVariant, Variant, VariantScalarTypeId};
+use sheetlight_registers::{Ask, Job, Stage, is_name};
 use std::sync::Arc;
 
 /// What a method gives, or why it cannot be called now.

@@ -1,22 +1,19 @@
 //! Sheetlight as a vision system for OPC UA clients [opc-mv, OPC 40100-1]. In: a station's Modbus door. Out: an OPC UA
 //! server.
 //!
-//! Data flows one way: `station` reads `registers` over `modbus` -> `vision` (states of `machine`, `results`) ->
-//! `outlet` -> nodes. Calls flow back: `gate` -> the server -> `node` -> `vision` -> `station`.
+//! Data flows one way: `sheetlight_registers` reads the station -> `vision` (states of `machine`, `results`) ->
+//! `outlet` -> nodes. Calls flow back: `gate` -> the server -> `node` -> `vision` -> the station.
 
 mod arguments;
 mod calls;
 mod gate;
 mod machine;
-mod modbus;
 mod model;
 mod node;
 mod options;
 mod outlet;
-mod registers;
 mod results;
 mod security;
-mod station;
 mod vision;
 
 use clap::Parser;
@@ -25,7 +22,7 @@ use opcua::server::{ServerBuilder, ServerHandle};
 use opcua::types::BuildInfo;
 use options::Options;
 use outlet::Outlet;
-use station::Station;
+use sheetlight_registers::{Seen, Station};
 use std::io::Read;
 use std::net::SocketAddr;
 use std::path::Path;
@@ -204,7 +201,7 @@ async fn advertised(handle: &ServerHandle, inside: SocketAddr, port: u16) {
 fn begin(options: &Options, vision: &Arc<Vision>, outlet: Outlet) -> Result<(), Fault> {
     let (sees, mut lost) = (vision.clone(), None::<String>);
     let address = options.station.clone();
-    let told = move |what: Result<registers::Seen, String>| {
+    let told = move |what: Result<Seen, String>| {
         match &what {
             Ok(_) if lost.take().is_some() => eprintln!("the station {address} is reached again"),
             Err(why) if lost.as_ref() != Some(why) => {

@@ -1,8 +1,8 @@
 //! In: the command line. Out: what it asks for, checked. Pure but for the address that a name has.
 //! Frame and unit: none.
 
-use crate::registers::is_name;
 use clap::Parser;
+use sheetlight_registers::{is_address, is_name};
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
 
@@ -52,10 +52,9 @@ pub struct Listen {
 }
 
 fn station(text: &str) -> Result<String, String> {
-    let port = text.rsplit_once(':').filter(|(host, _)| !host.is_empty()).and_then(|(_, p)| p.parse::<u16>().ok());
-    match port {
-        Some(port) if port > 0 => Ok(text.to_owned()),
-        _ => Err("wanted HOST:PORT, e.g. 127.0.0.1:5020".into()),
+    match is_address(text) {
+        true => Ok(text.to_owned()),
+        false => Err("wanted HOST:PORT, e.g. 127.0.0.1:5020".into()),
     }
 }
 

@@ -4,8 +4,8 @@
 use crate::model::data::{
     JobId, MeasId, PartId, ProcessingTimes, ProductId, RecipeIdExternal, RecipeIdInternal, ResultData, ResultId,
 };
-use crate::registers::{Job, Stage};
 use opcua::types::{DateTime, Variant, VariantScalarTypeId};
+use sheetlight_registers::{Job, Stage};
 use std::collections::VecDeque;
 
 /// Most results that are kept; older ones are in the station's folder.

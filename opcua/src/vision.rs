@@ -6,10 +6,9 @@ use crate::machine::{Machine, State, Transition};
 use crate::model::data::JobId;
 use crate::model::ids::{self, kind, transition_of};
 use crate::outlet::{Told, Value};
-use crate::registers::{Answer, Ask, Job, Seen};
 use crate::results::{Order, Outcome, Results, strings};
-use crate::station::{Station, Unanswered};
 use opcua::types::Variant;
+use sheetlight_registers::{Answer, Ask, Job, Seen, Station, Unanswered};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use tokio::runtime::Handle;
 

@@ -1,13 +1,18 @@
-//! In: topics with their quality of service, and messages. Out: publishers in Zenoh that rmw_zenoh takes for its own:
-//! tokens, keys, attachments, and the last messages kept for later subscribers.
+//! In: topics with their quality of service, messages, and who answers calls. Out: publishers and services in Zenoh that
+//! rmw_zenoh takes for its own: tokens, keys, attachments, and the last messages kept for later subscribers.
 
+use super::definition::Definition;
 use super::fault::{Fault, fault};
-use super::names::Place;
+use super::hash;
+use super::names::{Entity, Place};
 use super::options::{HERE, Options};
 use super::qos::Qos;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, SystemTime};
 use zenoh::liveliness::LivelinessToken;
 use zenoh::qos::{CongestionControl, Reliability};
+use zenoh::query::{Query, Queryable};
 use zenoh::{Session, Wait};
 use zenoh_ext::{AdvancedPublisher, AdvancedPublisherBuilderExt, CacheConfig, MissDetectionConfig};
 
@@ -19,6 +24,11 @@ const CLOSING: Duration = Duration::from_secs(2);
 
 const MOMENT: Duration = Duration::from_millis(300);
 
+/// Most calls that are answered at a time.
+const MOST_CALLS: usize = 16;
+/// Quality of service that rmw_zenoh gives its services: reliable, depth 10.
+const SERVICE: Qos = Qos { reliable: true, kept: false, depth: 10 };
+
 /// The session.
 pub struct Door {
     session: Session,
@@ -26,8 +36,24 @@ pub struct Door {
     // It stands as long as the session.
     _node: LivelinessToken,
     entities: u32,
+    /// Calls that are being answered.
+    calls: Arc<AtomicUsize>,
     /// Whether a router was reached when it was last asked; none is needed where the session listens.
     reached: Option<bool>,
+}
+
+/// A service that answers, until it is dropped.
+pub struct Service {
+    _queryable: Queryable<()>,
+    _token: LivelinessToken,
+}
+
+/// What a call gets.
+pub enum Answered {
+    /// The message of the answer.
+    Bytes(Vec<u8>),
+    /// The request is not of the service's type.
+    Foreign(&'static str),
 }
 
 /// A topic that is published.
@@ -58,7 +84,7 @@ impl Door {
         let place = Place { domain, namespace, session: session.zid().to_string() };
         let node = session.liveliness().declare_token(place.node()).wait().map_err(lost)?;
         let reached = options.listen.is_none().then_some(true);
-        Ok(Door { session, place, _node: node, entities: 0, reached })
+        Ok(Door { session, place, _node: node, entities: 0, calls: Arc::default(), reached })
     }
 
     /// The topic's whole name.
@@ -83,10 +109,49 @@ impl Door {
             }
         }
         let publisher = publisher.wait().map_err(lost)?;
-        let token = self.place.publisher(self.entities, &topic, kind, hash, &qos.words());
+        let token = self.place.entity(self.entities, Entity::Publisher, &topic, kind, hash, &qos.words());
         let identity = identity(&token);
         let token = self.session.liveliness().declare_token(token).wait().map_err(lost)?;
         Ok(Topic { publisher, _token: token, next: 1, identity })
+    }
+
+    /// Begins to publish a topic whose type is known here.
+    pub fn publish_as(&mut self, topic: &str, kind: (&str, &str), qos: Qos) -> Result<Topic, Fault> {
+        self.publish(topic, kind.0, &hashed(kind)?, qos)
+    }
+
+    /// Begins to answer calls. Each has a thread of its own, because an answer may take minutes.
+    pub fn answer(
+        &mut self,
+        service: &str,
+        kind: (&str, &str),
+        answer: impl Fn(&[u8]) -> Answered + Send + Sync + 'static,
+    ) -> Result<Service, Fault> {
+        self.entities += 1;
+        let (name, hash) = (self.place.topic(service), hashed(kind)?);
+        let (answer, calls) = (Arc::new(answer), self.calls.clone());
+        let queryable = self.session.declare_queryable(self.place.key(&name, kind.0, &hash)).complete(true);
+        let queryable = queryable.callback(move |query| {
+            let (answer, calls) = (answer.clone(), calls.clone());
+            if calls.fetch_add(1, Ordering::Relaxed) >= MOST_CALLS {
+                calls.fetch_sub(1, Ordering::Relaxed);
+                refuses(&query, &format!("{MOST_CALLS} calls wait for their answers"));
+                return;
+            }
+            let of_thread = calls.clone();
+            let thread = std::thread::Builder::new().name("call".into()).spawn(move || {
+                replies(&query, &*answer);
+                of_thread.fetch_sub(1, Ordering::Relaxed);
+            });
+            // The call went with the thread that could not begin: who called gets no answer.
+            if thread.is_err() {
+                calls.fetch_sub(1, Ordering::Relaxed);
+            }
+        });
+        let queryable = queryable.wait().map_err(lost)?;
+        let token = self.place.entity(self.entities, Entity::Service, &name, kind.0, &hash, &SERVICE.words());
+        let token = self.session.liveliness().declare_token(token).wait().map_err(lost)?;
+        Ok(Service { _queryable: queryable, _token: token })
     }
 
     /// Says when the router is lost, and when it is there again.
@@ -127,6 +192,43 @@ impl Topic {
     /// Number of messages that were sent.
     pub fn sent(&self) -> i64 {
         self.next - 1
+    }
+}
+
+/// The hash of a type from its definition.
+fn hashed((name, text): (&str, &str)) -> Result<String, Fault> {
+    let definition = Definition::read(name, text.as_bytes());
+    definition.map(|d| hash::of(&d)).map_err(|why| fault(why, "a fault of this program", "report it"))
+}
+
+/// Answers a call. An answer carries the number and the identity of its request, by which rmw_zenoh knows it again; a
+/// request of plain Zenoh has none.
+fn replies(query: &Query, answer: &impl Fn(&[u8]) -> Answered) {
+    let request = query.payload().map(|p| p.to_bytes().into_owned()).unwrap_or_default();
+    let bytes = match answer(&request) {
+        Answered::Bytes(bytes) => bytes,
+        Answered::Foreign(why) => return refuses(query, why),
+    };
+    let reply = query.reply(query.key_expr().clone(), bytes);
+    // Who has gone gets no answer.
+    let _ = match query.attachment().and_then(|a| asked(&a.to_bytes())) {
+        Some((number, identity)) => {
+            let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+            reply.attachment(&attachment(number, now.as_nanos() as i64, identity)[..]).wait()
+        }
+        None => reply.wait(),
+    };
+}
+
+fn refuses(query: &Query, why: &str) {
+    let _ = query.reply_err(why).wait();
+}
+
+/// Number and identity of a request.
+fn asked(bytes: &[u8]) -> Option<(i64, [u8; 16])> {
+    match bytes.len() == 33 && bytes[16] == 16 {
+        true => Some((i64::from_le_bytes(bytes[..8].try_into().ok()?), bytes[17..].try_into().ok()?)),
+        false => None,
     }
 }
 
@@ -190,5 +292,7 @@ mod tests {
         let bytes = attachment(3, 0x0102_0304_0506_0708, [9; 16]);
         let expected = [&[3, 0, 0, 0, 0, 0, 0, 0, 8, 7, 6, 5, 4, 3, 2, 1, 16][..], &[9; 16]].concat();
         assert_eq!(bytes[..], expected[..]);
+        assert_eq!(asked(&bytes), Some((3, [9; 16])));
+        assert_eq!((asked(&bytes[1..]), asked(&[0; 33]), asked(&[])), (None, None, None));
     }
 }

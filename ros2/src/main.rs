@@ -1,7 +1,8 @@
-//! Live messages for ROS 2, without ROS. In: MCAP with messages of ROS 2, from a file or a pipe. Out: the same messages
-//! over Zenoh, in the form that rmw_zenoh reads.
+//! Messages and services of ROS 2, without ROS. In: MCAP with messages of ROS 2, from a file or a pipe; or a station.
+//! Out: the same messages, or the station's state and jobs, over Zenoh, in the form that rmw_zenoh reads.
 //!
 //! Data flows one way: `stream` (records) -> `relay` (`definition` -> `hash`, `cdr`, `qos`, `names`) -> `door` (Zenoh).
+//! In place of a stream, `station` feeds the door, and answers its calls.
 
 mod cdr;
 mod definition;
@@ -13,6 +14,7 @@ mod options;
 mod pace;
 mod qos;
 mod relay;
+mod station;
 mod stream;
 
 use clap::Parser;
@@ -21,6 +23,7 @@ use fault::{Fault, fault};
 use options::{HERE, Options};
 use pace::Pace;
 use relay::{Account, Relay};
+use station::Wanted;
 use std::io::Write;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -48,11 +51,16 @@ fn run(options: &Options) -> Result<(), Fault> {
     }
     let ending = ending()?;
     let stop = move || ending.load(Ordering::Relaxed);
-    let mut stream = Stream::open(&options.input)?;
+    let stream = options.input.as_deref().map(Stream::open).transpose()?;
     let mut door = Door::open(options, domain)?;
     let at = options.listen.as_ref().map(|a| format!("listening on {a}"));
     let at = at.unwrap_or_else(|| format!("router {}", options.connect.as_deref().unwrap_or(HERE)));
     say(&format!("ROS 2 domain {domain}, {at}"));
+    let Some(mut stream) = stream else {
+        let went = station::serve(&mut door, &wanted(options), &stop);
+        door.close();
+        return went;
+    };
     let pace = (!options.is_live()).then(|| Pace::new(options.rate.unwrap_or(1.0)));
     let (account, went, topics) = Relay::new(&mut door, pace, options.delay, &stop).run(&mut stream);
     told(&account);
@@ -70,6 +78,16 @@ fn run(options: &Options) -> Result<(), Fault> {
             "the program that wrote them gave them another definition",
             "the first of each channel is named above",
         )),
+    }
+}
+
+/// What is shown of a station.
+fn wanted(options: &Options) -> Wanted<'_> {
+    Wanted {
+        address: options.station.as_deref().unwrap_or_default(),
+        recipes: &options.recipe,
+        notation: options.notation,
+        frame: &options.frame,
     }
 }
 

@@ -6,6 +6,13 @@ use super::definition::{LONGEST, is_word};
 /// Name of the node.
 pub const NODE: &str = "sheetlight";
 
+/// What a node has.
+#[derive(Clone, Copy, Debug)]
+pub enum Entity {
+    Publisher,
+    Service,
+}
+
 /// Where this program stands in the graph of ROS 2.
 #[derive(Clone, Debug)]
 pub struct Place {
@@ -51,9 +58,13 @@ impl Place {
         self.token(0, "NN")
     }
 
-    /// The token of a publisher. `id` is another for each, and not 0: that is the node's.
-    pub fn publisher(&self, id: u32, topic: &str, kind: &str, hash: &str, qos: &str) -> String {
-        format!("{}/{}/{}/{hash}/{qos}", self.token(id, "MP"), mangled(topic), mangled(&dds(kind)))
+    /// The token of a publisher or a service. `id` is another for each, and not 0: that is the node's.
+    pub fn entity(&self, id: u32, what: Entity, name: &str, kind: &str, hash: &str, qos: &str) -> String {
+        let what = match what {
+            Entity::Publisher => "MP",
+            Entity::Service => "SS",
+        };
+        format!("{}/{}/{}/{hash}/{qos}", self.token(id, what), mangled(name), mangled(&dds(kind)))
     }
 
     /// Domain, session, node 0, entity, kind of entity, enclave, namespace, node.
@@ -78,10 +89,17 @@ mod tests {
         let place = place("/");
         assert_eq!(place.node(), "@ros2_lv/2/8b20917502ee955ac4476e0266340d5c/0/0/NN/%/%/sheetlight");
         assert_eq!(
-            place.publisher(10, "/chatter", "std_msgs/msg/String", hash, "::,7:,:,:,,"),
+            place.entity(10, Entity::Publisher, "/chatter", "std_msgs/msg/String", hash, "::,7:,:,:,,"),
             format!(
                 "@ros2_lv/2/8b20917502ee955ac4476e0266340d5c/0/10/MP/%/%/sheetlight/%chatter/\
                  std_msgs::msg::dds_::String_/{hash}/::,7:,:,:,,"
+            )
+        );
+        assert_eq!(
+            place.entity(11, Entity::Service, "/a/add", "example_interfaces/srv/AddTwoInts", hash, "::,10:,:,:,,"),
+            format!(
+                "@ros2_lv/2/8b20917502ee955ac4476e0266340d5c/0/11/SS/%/%/sheetlight/%a%add/\
+                 example_interfaces::srv::dds_::AddTwoInts_/{hash}/::,10:,:,:,,"
             )
         );
         assert_eq!(

@@ -1,13 +1,17 @@
 //! In: the command line. Out: what it asks for, checked.
 //! Frame and unit: s.
 
+use crate::definition::is_word;
 use crate::names::is_name;
+use crate::station::Notation;
 use clap::Parser;
+use sheetlight_registers::is_address;
 use std::path::PathBuf;
 
-/// Send the messages of an MCAP file or pipe to ROS 2 over Zenoh
+/// Send the messages of an MCAP file or pipe to ROS 2 over Zenoh, or show a station in ROS 2
 ///
-/// Topics appear as rmw_zenoh's own do. The channels need profile ros2, ros2msg schemas and cdr messages.
+/// Topics and services appear as rmw_zenoh's own do. A file's channels need profile ros2, ros2msg schemas and cdr
+/// messages.
 #[derive(Debug, Parser)]
 #[command(
     version,
@@ -20,14 +24,30 @@ Examples:
   sheetlight-ros2 board7.mcap --rate 0.5 --stay --domain 3
   sheetlight live --station cell3 --camera gige://first --mcap - | sheetlight-ros2 -
   sheetlight-ros2 - --connect tcp/192.168.0.20:7447 --namespace /cell3 < board7.mcap
+  sheetlight-ros2 --station 127.0.0.1:5020 --recipe led --notation denso
+  ros2 service call /sheetlight/insert/led std_srvs/srv/Trigger
 
 Without --connect and --listen it connects to a router of this machine: tcp/127.0.0.1:7447.
-It only sends: nothing that arrives is read. Guide: docs/connections.md"
+Services start jobs. They confirm no motion: a person does that at the station's screen.
+Guide: docs/connections.md"
 )]
 pub struct Options {
     /// MCAP file, played at its recorded pace; - is standard input, sent as it comes
-    #[arg(value_name = "FILE|-")]
-    pub input: PathBuf,
+    #[arg(value_name = "FILE|-", required_unless_present = "station")]
+    pub input: Option<PathBuf>,
+    /// Instead of a file: HOST:PORT of `station serve --modbus`, whose state is shown and whose jobs are services
+    #[arg(long, value_name = "HOST:PORT", value_parser = station, conflicts_with_all = ["input", "rate", "delay", "stay"])]
+    pub station: Option<String>,
+    /// A recipe of the station that gets services insert and find; may be repeated
+    #[arg(long, value_name = "NAME", value_parser = recipe, requires = "station", conflicts_with = "input")]
+    pub recipe: Vec<String>,
+    /// Order of the angles in the station's poses; with it insertion poses are sent
+    #[arg(long, value_enum, requires = "station", conflicts_with = "input")]
+    pub notation: Option<Notation>,
+    /// Name of the robot's base frame in these poses
+    #[arg(long, value_name = "NAME", default_value = "base", value_parser = frame, requires = "station",
+        conflicts_with = "input")]
+    pub frame: String,
     /// The router to connect to [default: tcp/127.0.0.1:7447]
     #[arg(long, value_name = "tcp/HOST:PORT", value_parser = endpoint, conflicts_with = "listen")]
     pub connect: Option<String>,
@@ -71,6 +91,29 @@ fn endpoint(text: &str) -> Result<String, String> {
     }
 }
 
+fn station(text: &str) -> Result<String, String> {
+    match is_address(text) {
+        true => Ok(text.to_owned()),
+        false => Err("wanted HOST:PORT, e.g. 127.0.0.1:5020".into()),
+    }
+}
+
+/// Services are named after recipes, and names of ROS 2 have fewer letters than names of recipes.
+fn recipe(text: &str) -> Result<String, String> {
+    match is_word(text) && text.len() <= 40 {
+        true => Ok(text.to_owned()),
+        false => Err("wanted 1 to 40 letters, digits and _, a letter first; store the recipe under such a name".into()),
+    }
+}
+
+fn frame(text: &str) -> Result<String, String> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '/');
+    match (1..=100).contains(&text.len()) && text.chars().all(plain) && !text.starts_with('/') {
+        true => Ok(text.to_owned()),
+        false => Err("wanted the name of a frame, e.g. base_link".into()),
+    }
+}
+
 fn namespace(text: &str) -> Result<String, String> {
     match text == "/" || is_name(text) {
         true => Ok(text.to_owned()),
@@ -94,7 +137,7 @@ fn delay(text: &str) -> Result<f64, String> {
 impl Options {
     /// Whether the messages come from standard input.
     pub fn is_live(&self) -> bool {
-        self.input.as_os_str() == "-"
+        self.input.as_ref().is_some_and(|input| input.as_os_str() == "-")
     }
 
     /// The domain.
@@ -130,8 +173,19 @@ mod tests {
         assert_eq!((good.is_live(), good.listen.as_deref(), good.connect), (true, Some(HERE), None));
         assert_eq!(parsed(&["a", "--listen", "tcp/[::1]:7"]).unwrap().listen.as_deref(), Some("tcp/[::1]:7"));
         assert_eq!(parsed(&["a.mcap", "--domain", "7"]).unwrap().domain(), Ok(7));
+        let of_station = parsed(&["--station", "127.0.0.1:5020", "--recipe", "led", "--notation", "kuka"]).unwrap();
+        assert_eq!((of_station.recipe, of_station.notation), (vec!["led".to_owned()], Some(Notation::Kuka)));
         for bad in [
-            &[][..],
+            &["a", "--station", "127.0.0.1:5020"][..],
+            &["--station", "127.0.0.1"],
+            &["--station", "127.0.0.1:5020", "--rate", "1"],
+            &["--station", "127.0.0.1:5020", "--recipe", "led-2"],
+            &["--station", "127.0.0.1:5020", "--frame", "/base"],
+            &["--station", "127.0.0.1:5020", "--notation", "abb"],
+            &["a", "--recipe", "led"],
+            &["a", "--notation", "kuka"],
+            &["a", "--frame", "b"],
+            &[],
             &["a", "--connect", "127.0.0.1:7447"],
             &["a", "--connect", "tcp/127.0.0.1"],
             &["a", "--connect", "tcp/127.0.0.1:0"],

@@ -1,5 +1,6 @@
 //! In: this program and the program `sheetlight`. Out: failure where readers that share no code with it (Zenoh's own
-//! subscribers, rosbags) see other messages than the scan has, or where broken input does harm (ros2.py).
+//! subscribers, rosbags) see other messages than the scan has, or where broken input does harm (ros2.py), or where calls
+//! of services do something else at a station than they may (station.py).
 //! Frame and unit: m; s.
 
 use std::path::{Path, PathBuf};
@@ -17,21 +18,20 @@ fn skipped(why: &str) {
     eprintln!("\n*** SKIPPED: {why} ***\n");
 }
 
-#[test]
-fn subscribers_of_zenoh_get_the_scan_in_the_form_of_rmw_zenoh() {
+/// Runs a test in Python.
+fn python(script: &str, words: &[&str]) {
     let Some(sheetlight) = sheetlight() else {
         return skipped("the program sheetlight is not built: cargo build --package sheetlight, or make test");
     };
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = tempfile::tempdir().unwrap();
-    // The long form relays profiles for a minute.
-    let seconds = if std::env::var_os("SHEETLIGHT_LONG").is_some() { "60" } else { "4" };
     let run = Command::new("python3")
-        .arg(here.join("tests/ros2.py"))
+        .arg(here.join("tests").join(script))
         .arg(env!("CARGO_BIN_EXE_sheetlight-ros2"))
         .arg(&sheetlight)
         .arg(folder.path())
-        .arg(seconds)
+        .args(words)
+        .env("PYTHONPATH", here.join("../tests/web"))
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .output();
     match run {
@@ -42,4 +42,20 @@ fn subscribers_of_zenoh_get_the_scan_in_the_form_of_rmw_zenoh() {
         }
         Err(e) => skipped(&format!("python3: {e}")),
     }
+}
+
+fn is_long() -> bool {
+    std::env::var_os("SHEETLIGHT_LONG").is_some()
+}
+
+#[test]
+fn subscribers_of_zenoh_get_the_scan_in_the_form_of_rmw_zenoh() {
+    // The long form relays profiles for a minute.
+    python("ros2.py", &[if is_long() { "60" } else { "4" }]);
+}
+
+#[test]
+fn clients_of_services_start_jobs_that_only_the_screen_confirms() {
+    // The long form sends more foreign requests.
+    python("station.py", &["osc", "20", if is_long() { "10000" } else { "300" }]);
 }

@@ -3,7 +3,7 @@
 //! Frame and unit: s.
 
 use crate::modbus::{Trouble, Wire};
-use crate::registers::{self, ANSWERS, Answer, Ask, JOBS, Seen, TABLE, WORDS};
+use crate::table::{self, ANSWERS, Answer, Ask, JOBS, Seen, TABLE, WORDS};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::thread::Builder;
 use std::time::{Duration, Instant};
@@ -59,14 +59,30 @@ impl Station {
     /// # Errors
     /// There is no answer.
     pub async fn ask(&self, ask: Ask) -> Result<Answer, Unanswered> {
+        self.send(ask)?.await.unwrap_or_else(|_| Err(ends()))
+    }
+
+    /// Asks the station, and waits on this thread, which serves no asynchronous tasks.
+    ///
+    /// # Errors
+    /// There is no answer.
+    pub fn ask_here(&self, ask: Ask) -> Result<Answer, Unanswered> {
+        self.send(ask)?.blocking_recv().unwrap_or_else(|_| Err(ends()))
+    }
+
+    fn send(&self, ask: Ask) -> Result<oneshot::Receiver<Result<Answer, Unanswered>>, Unanswered> {
         let (reply, answer) = oneshot::channel();
         match self.0.try_send((ask, reply)) {
-            Ok(()) => {}
-            Err(TrySendError::Full(_)) => return Err(Unanswered::Busy(format!("{MOST} requests wait"))),
-            Err(TrySendError::Disconnected(_)) => return Err(Unanswered::NotReached("the program ends".into())),
+            Ok(()) => Ok(answer),
+            Err(TrySendError::Full(_)) => Err(Unanswered::Busy(format!("{MOST} requests wait"))),
+            Err(TrySendError::Disconnected(_)) => Err(Unanswered::NotReached("the program ends".into())),
         }
-        answer.await.unwrap_or_else(|_| Err(Unanswered::Lost("the program ends".into())))
     }
+}
+
+/// The program ends while an answer is waited for.
+fn ends() -> Unanswered {
+    Unanswered::Lost("the program ends".into())
 }
 
 /// A connection that has shown the table.
@@ -111,7 +127,7 @@ impl Talk {
             let jobs = read(&mut self.wire, JOBS)?;
             let words = if jobs[7] == 0 { vec![] } else { read(&mut self.wire, WORDS)? };
             if jobs[7] == 0 || read(&mut self.wire, JOBS)?[4..8] == jobs[4..8] {
-                return Ok((registers::seen(&answers, &jobs, &words), answers));
+                return Ok((table::seen(&answers, &jobs, &words), answers));
             }
         }
     }
@@ -140,7 +156,7 @@ impl Talk {
         loop {
             let (seen, answers) = self.look()?;
             if answers[2] == 0 && answers[3] == number {
-                let answer = registers::answer(&answers);
+                let answer = table::answer(&answers);
                 told(Ok(seen));
                 return Ok(Ok(answer));
             }

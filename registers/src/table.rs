@@ -227,6 +227,12 @@ pub fn seen(answers: &[u16], jobs: &[u16], words: &[u16]) -> Seen {
     Seen { jobs: true, robot, job, ended: jobs[8], inserted: jobs[9] }
 }
 
+/// Whether the text is HOST:PORT, with a port that can be reached.
+pub fn is_address(text: &str) -> bool {
+    let port = text.rsplit_once(':').filter(|(host, _)| !host.is_empty()).and_then(|(_, p)| p.parse::<u16>().ok());
+    port.is_some_and(|port| port > 0)
+}
+
 /// Whether a recipe's name can be written into the registers: 1 to 40 letters, digits, - and _.
 pub fn is_name(name: &str) -> bool {
     let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
