@@ -1,5 +1,5 @@
-//! In: topics with their quality of service, messages, and who answers calls. Out: publishers and services in Zenoh that
-//! rmw_zenoh takes for its own: tokens, keys, attachments, and the last messages kept for later subscribers.
+//! In: topics with their quality of service, messages, and who answers calls. Out: publishers and services in Zenoh
+//! that rmw_zenoh takes for its own: tokens, keys, attachments, and the last messages kept for later subscribers.
 
 use super::definition::Definition;
 use super::fault::{Fault, fault};

@@ -36,7 +36,8 @@ pub struct Options {
     #[arg(value_name = "FILE|-", required_unless_present = "station")]
     pub input: Option<PathBuf>,
     /// Instead of a file: HOST:PORT of `station serve --modbus`, whose state is shown and whose jobs are services
-    #[arg(long, value_name = "HOST:PORT", value_parser = station, conflicts_with_all = ["input", "rate", "delay", "stay"])]
+    #[arg(long, value_name = "HOST:PORT", value_parser = station,
+        conflicts_with_all = ["input", "rate", "delay", "stay"])]
     pub station: Option<String>,
     /// A recipe of the station that gets services insert and find; may be repeated
     #[arg(long, value_name = "NAME", value_parser = recipe, requires = "station", conflicts_with = "input")]

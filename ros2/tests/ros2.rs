@@ -1,5 +1,5 @@
 //! In: this program and the program `sheetlight`. Out: failure where readers that share no code with it (Zenoh's own
-//! subscribers, rosbags) see other messages than the scan has, or where broken input does harm (ros2.py), or where calls
+//! subscribers, rosbags) see other messages than the scan has, where broken input does harm (ros2.py), or where calls
 //! of services do something else at a station than they may (station.py).
 //! Frame and unit: m; s.
 

@@ -91,8 +91,8 @@ pub fn record(
     ended_so(stream, recorder, Vec::new(), full.or(ended))
 }
 
-/// The next shot; until it comes `say` receives news, and the account at intervals. The error is the fault that ended the
-/// stream, none if its end was requested.
+/// The next shot; until it comes `say` receives news, and the account at intervals. The error is the fault that ended
+/// the stream, none if its end was requested.
 pub(super) fn next_shot(
     stream: &mut Stream,
     say: &mut impl FnMut(&Stream, Option<String>),
