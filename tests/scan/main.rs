@@ -18,6 +18,7 @@ mod golden;
 mod inputs;
 mod live;
 mod masks;
+mod print;
 mod profiles;
 mod readout;
 mod resume;
