@@ -5,6 +5,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::{Mutex, PoisonError};
 
 /// The program `sheetlight`: beside this one, where `make test` builds it before, or the one that SHEETLIGHT_BIN names.
 fn sheetlight() -> Option<PathBuf> {
@@ -18,8 +19,12 @@ fn skipped(why: &str) {
     eprintln!("\n*** SKIPPED: {why} ***\n");
 }
 
+/// One test at a time: the scan of one delays the stream of the other.
+static ALONE: Mutex<()> = Mutex::new(());
+
 /// Runs a test in Python.
 fn python(script: &str, words: &[&str]) {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(sheetlight) = sheetlight() else {
         return skipped("the program sheetlight is not built: cargo build --package sheetlight, or make test");
     };
