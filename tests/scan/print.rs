@@ -14,7 +14,7 @@ use std::path::Path;
 const SHEET: f64 = 0.105;
 /// Distance of the shots in those, and the largest share of the pull that may be left on average over the angles.
 /// Before neighbours farther away than one shot were looked at, it was 1 at a quarter.
-const SPACINGS: [(f64, f64); 5] = [(0.25, 0.35), (0.5, 0.4), (1.0, 0.45), (2.6, 0.75), (5.0, 1.0)];
+const SPACINGS: [(f64, f64); 5] = [(0.25, 0.4), (0.5, 0.45), (1.0, 0.5), (2.6, 0.7), (5.0, 1.0)];
 /// Depth of the chart in the direction of the motion, mm.
 const DEPTH: f64 = 8.0;
 
@@ -91,7 +91,7 @@ fn print_pulls_points_less_the_finer_the_shots_are() {
             std::fs::write(settings, text.replace("thick_sheet = true", "thick_sheet = false")).unwrap();
             let [raw, _, _] = scanned("raw");
             let [from, to, noise] = [raw, printed, bare].map(f64::sqrt);
-            print!("{spacing} sigma, {degrees} degrees: {from:.4} -> {to:.4} mm, {noise:.4} beside the chart; ");
+            print!("{spacing} sigma, {degrees:.1} degrees: {from:.4} -> {to:.4} mm, {noise:.4} beside the chart; ");
             println!("{share:.4} beyond three sigma");
             before += raw - bare;
             after += printed - bare;
