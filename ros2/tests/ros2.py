@@ -21,7 +21,7 @@ try:
     import numpy as np
     import xxhash
     import zenoh.ext
-    from hears import Heard, attachment, free_port, session, tokens, until
+    from hears import Heard, attachment, ends_with, free_port, session, tokens, until
     from rosbags.typesys import Stores, get_typestore
 except ImportError as e:
     print(f"a Python package is missing: {e}: tools/python-env.sh .venv files")
@@ -438,17 +438,4 @@ def main():
     router.close()
 
 
-try:
-    main()
-    code = 0
-except BaseException:
-    import traceback
-
-    traceback.print_exc()
-    code = 1
-sys.stdout.flush()
-sys.stderr.flush()
-for process in BEGUN:
-    process.kill()
-# Threads of sessions that a failure left open would keep the process.
-os._exit(code)
+ends_with(main, BEGUN)

@@ -5,7 +5,6 @@ differ from what the screen's own interface and the cell's truth say, or if thei
 those of rmw_zenoh. The client is eclipse-zenoh, messages are read with rosbags, turns are computed with scipy.
 Frame and unit: mm, degrees; m where messages of ROS 2 are; s."""
 
-import atexit
 import os
 import random
 import re
@@ -18,7 +17,7 @@ import time
 try:
     import numpy as np
     import zenoh.ext
-    from hears import Heard, attachment, free_port, session, tokens
+    from hears import Heard, attachment, ends_with, free_port, session, tokens
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
     from scipy.spatial.transform import Rotation
 except ImportError as e:
@@ -40,7 +39,7 @@ TRIGGER = (
 EMPTY = b"\0\1\0\0\0"
 BEGUN = []
 # A job of the simulated cell on a busy machine.
-LONG = 900.0
+PATIENT = 900.0
 
 
 def door(s):
@@ -71,7 +70,7 @@ class Client:
         head = struct.pack("<qqB", number, time.time_ns(), 16) + self.identity
         more = {"attachment": head} if attached else {}
         key = f"0/sheetlight/{service}/{TRIGGER}"
-        return list(self.at.get(key, payload=payload, timeout=LONG, **more)), number
+        return list(self.at.get(key, payload=payload, timeout=PATIENT, **more)), number
 
     def call(self, service):
         (reply,), number = self.raw(service)
@@ -89,7 +88,7 @@ class Client:
         thread.start()
 
         def ended():
-            thread.join(LONG)
+            thread.join(PATIENT)
             assert got, f"{service} was not answered"
             return got[0]
 
@@ -264,7 +263,8 @@ def found(address, at):
     heard, c = Heard(at), Client(at)
     node = begin(s, address, "led", "dimm")
     until("the station", lambda: any(v for _, _, v in statuses(heard)))
-    assert s.job({"procedure": "scan", "recording": "scan"})["state"] == "done"
+    scan = s.job({"procedure": "scan", "recording": "scan"})
+    assert scan["state"] == "done", scan
     good, words = c.call("insert/led")
     assert not good and words.startswith("refused, 9: "), words
     good, words = c.call("find/led")
@@ -284,6 +284,21 @@ def found(address, at):
     assert not good and "; insertion" not in words, words
     time.sleep(0.5)
     assert len(heard.of("/sheetlight/insertion")) == 1
+    # A program that starts later does not pass an old pose off as a new one; a recipe that is named twice has one service of each kind.
+    ends(node)
+    node = begin(s, address, "led", "led")
+    count = len(heard.of("/diagnostics"))
+    until("the station", lambda: any(v for _, _, v in statuses(heard)[count:]))
+    assert s.job({"procedure": "find", "recipe": "led", "scans": [scan["id"]]})["state"] == "done"
+    until("the new pose", lambda: len(heard.of("/sheetlight/insertion")) > 1)
+    ends(node)
+    node = begin(s, address, "led", "led")
+    count = len(heard.of("/diagnostics"))
+    until("the station", lambda: any(v for _, _, v in statuses(heard)[count:]))
+    # The node, three services, two topics.
+    assert len(tokens(at, 0)) == 6, tokens(at, 0)
+    time.sleep(1.0)
+    assert len(heard.of("/sheetlight/insertion")) == 2, "an old pose was sent"
     ends(node)
     assert s.end() == 0
     heard.subscriber.undeclare()
@@ -338,18 +353,4 @@ def main():
     router.close()
 
 
-try:
-    main()
-    code = 0
-except BaseException:
-    import traceback
-
-    traceback.print_exc()
-    code = 1
-sys.stdout.flush()
-sys.stderr.flush()
-for process in BEGUN:
-    process.kill()
-# Threads of sessions that a failure left open would keep the process; servers end with `atexit`.
-atexit._run_exitfuncs()
-os._exit(code)
+ends_with(main, BEGUN)

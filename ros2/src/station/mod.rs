@@ -17,6 +17,7 @@ use crate::fault::{Fault, fault};
 use crate::qos::Qos;
 use calls::Call;
 use sheetlight_registers::{Job, Stage, Station};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 use watch::Watch;
@@ -45,7 +46,9 @@ pub fn serve(door: &mut Door, wanted: &Wanted, stop: &dyn Fn() -> bool) -> Resul
     let station = Station::begin(wanted.address.to_owned(), move |seen| told.saw(seen));
     let station =
         station.map_err(|e| fault(format!("no thread: {e}"), "the system has none left", "close other programs"))?;
-    let jobs = wanted.recipes.iter().flat_map(|r| [Call::Insert(r.clone()), Call::Find(r.clone())]);
+    // A recipe that is named twice would answer each call twice.
+    let recipes: BTreeSet<&String> = wanted.recipes.iter().collect();
+    let jobs = recipes.into_iter().flat_map(|r| [Call::Insert(r.clone()), Call::Find(r.clone())]);
     let mut services = Vec::new();
     for call in jobs.chain([Call::Stop]) {
         let (station, watch, service) = (station.clone(), watch.clone(), call.service());
@@ -89,18 +92,22 @@ pub fn serve(door: &mut Door, wanted: &Wanted, stop: &dyn Fn() -> bool) -> Resul
 struct Poses {
     topic: Topic,
     notation: Notation,
-    /// The job whose pose was sent.
+    /// The last job that had ended when it was seen.
     last: Option<u32>,
 }
 
 impl Poses {
-    /// Sends the pose of a job that found its part, once. A job that ended otherwise has no pose to insert at.
+    /// Sends the pose of a job that found its part, once. A job that ended otherwise has no pose to insert at. One that
+    /// had ended before this program came is old, and its time is unknown: its pose is not sent.
     fn follow(&mut self, job: &Job, at: Duration, frame: &str) -> Result<(), Fault> {
-        let has_pose = job.found == 1 && job.pose != [0.0; 6];
-        if !has_pose || job.stage != Stage::Done || self.last == Some(job.number) {
+        if job.stage.is_under_way() || self.last == Some(job.number) {
+            self.last = self.last.or(Some(0));
             return Ok(());
         }
-        self.last = Some(job.number);
+        let is_new = self.last.replace(job.number).is_some();
+        if !is_new || job.stage != Stage::Done || job.found != 1 || job.pose == [0.0; 6] {
+            return Ok(());
+        }
         let [x, y, z, a, b, c] = job.pose;
         let position_m = [x, y, z].map(|mm| mm / 1000.0);
         self.topic.send(&message::pose(at, frame, position_m, self.notation.quaternion([a, b, c])))
