@@ -1,17 +1,21 @@
-//! In: a cloud, shot by shot. Out: each shot's line with two quantities for each of its points: how fast the light
-//! grows there from shot to shot, and how far the point moves along its ray when the sheet moves.
+//! In: a cloud, shot by shot, and how many shots away neighbours are. Out: each shot's line with two quantities for
+//! each of its points: how fast the light grows there over those shots, and how far the point moves along its ray when
+//! the sheet moves.
 //! Frame and unit: the cloud's frame, mm; docs/math.md, Sheets that are thick (2) and (3).
 
 use crate::fault::Result;
 use crate::geometry::{Base, Plane, Vec3};
 use crate::scan::{Along, CloudPoint, PointSource, Shots};
 use rayon::prelude::*;
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Points of another line count as neighbours up to this many pixels along the stripe, closer ones with more weight.
 const BESIDE_PX: f32 = 1.5;
 /// Least stripe width, px, for narrower or unmeasured stripes: centres on one surface differ by less than a pixel.
 const LEAST_PX: f32 = 1.0;
+/// Variance of the stripe that is the picture's blur, px², as in the stages (docs/math.md, (9)).
+const BLUR: f32 = 0.35;
 /// Largest change of the light from one shot to the next, as a logarithm; larger ones are clamped to it. There the
 /// light ends, and where between the two shots is unknown.
 const MOST: f64 = 1.5;
@@ -25,7 +29,7 @@ const SEEN: f64 = 0.25;
 /// What a point's neighbours in the shots before and after show about it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pull {
-    /// Change of the light's logarithm from shot to shot.
+    /// Change of the light's logarithm over the reach, which is a number of shots.
     pub change: f64,
     /// Difference between the mean of the neighbours' logarithms and the point's own. It marks light that falls on
     /// an edge, or on a line thinner than the shots resolve.
@@ -47,6 +51,9 @@ pub(super) struct Line {
     along: Along,
     /// Distance across the stripe at which a neighbour's weight is halved, px.
     width_px: f32,
+    /// Standard deviation of the sheet, mm, from the stripe's width where the line has its middle; 0 if the picture's
+    /// blur hides it.
+    sheet_mm: f64,
 }
 
 /// Pinhole and sheet of a shot.
@@ -60,6 +67,8 @@ struct Place {
 pub(super) struct Pulled {
     pub line: Arc<Line>,
     pub pulls: Vec<Pull>,
+    /// How many shots away neighbours may be here.
+    pub far: Option<f64>,
 }
 
 /// Position of a point along its stripe and across it, px.
@@ -82,8 +91,25 @@ impl Line {
             points.iter().zip(0..).map(|(p, i)| (in_picture(shots.along, p).0, i)).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let lights = points.iter().map(light).collect();
-        let width_px = shots.stripe_px.unwrap_or(0.0).max(LEAST_PX);
-        Line { shot, points, lights, place, order, along: shots.along, width_px }
+        let stripe_px = shots.stripe_px.unwrap_or(0.0);
+        let width_px = stripe_px.max(LEAST_PX);
+        let mut line = Line { shot, points, lights, place, order, along: shots.along, width_px, sheet_mm: 0.0 };
+        let sheet_px = f64::from(stripe_px * stripe_px - BLUR).max(0.0).sqrt();
+        line.sheet_mm = line.mm_per_px().map_or(0.0, |mm| sheet_px * mm);
+        line
+    }
+
+    /// How far the sheet stands from the place that is seen a pixel beside its own, mm, in the middle of the line on a
+    /// surface that the camera looks at squarely.
+    fn mm_per_px(&self) -> Option<f64> {
+        let middle = self.order.len() / 2;
+        let (one, two) = (self.order.get(middle)?, self.order.get(middle + 1)?);
+        let (p, q) = (self.points[one.1 as usize].at(), self.points[two.1 as usize].at());
+        let footprint = (q - p).norm() / f64::from(two.0 - one.0);
+        let Place { eye, sheet } = self.place.as_ref()?;
+        let across = (p - eye).normalize().dot(&sheet.normal);
+        let mm = footprint * (1.0 - across * across).max(0.0).sqrt();
+        mm.is_finite().then_some(mm)
     }
 
     /// This line's points that are neighbours of a point of another line: index, distances along and across the
@@ -120,53 +146,122 @@ impl Line {
         if sure > 0.0 { (sum / sure, all.min(1.0)) } else { (0.0, 0.0) }
     }
 
-    /// What two neighbouring lines show about a point of this one.
-    fn pull(&self, i: usize, before: Option<&Line>, after: Option<&Line>) -> Pull {
+    /// What a neighbouring line shows about a point of this one: how much brighter it is next to the point, the
+    /// distance of its sheet from the point along the normal, its weight, and how far it is dark there.
+    fn shown_by(&self, p: &CloudPoint, here: f64, line: Option<&Arc<Line>>) -> Option<[f64; 4]> {
+        let line = line?;
+        let way = -line.place.as_ref()?.sheet.distance(&p.at());
+        let (light, weight) = line.light(p);
+        Some([(light - here).clamp(-MOST, MOST), way, weight, (1.0 - weight / SEEN).max(0.0)])
+    }
+
+    /// Share of a point's light that does not end at any of these lines.
+    fn lit(&self, p: &CloudPoint, lines: &[Arc<Line>]) -> f64 {
+        lines.iter().map(|line| (line.light(p).1 / SEEN).min(1.0)).product()
+    }
+
+    /// What neighbouring lines show about a point of this one: `pairs` as far before it as after it. Where the light
+    /// ends at one of the lines `beyond`, the neighbours' bells of light are cut: their height then says little about
+    /// the surface's brightness, and nothing is concluded.
+    fn pull(&self, i: usize, pairs: &[[Option<&Arc<Line>>; 2]], beyond: Option<&[Arc<Line>]>) -> Pull {
         let p = &self.points[i];
         let (at, here) = (p.at(), self.light(p).0);
         let Some(Place { eye, sheet }) = &self.place else { return Pull::default() };
         let ray = at - eye;
-        // Of a neighbouring line: how much brighter it is next to the point, the distance of its sheet from the
-        // point along the normal, its weight, and how far it is dark there.
-        let beside = |line: Option<&Line>| {
-            let line = line?;
-            let way = -line.place.as_ref()?.sheet.distance(&at);
-            let (light, weight) = line.light(p);
-            Some([(light - here).clamp(-MOST, MOST), way, weight, (1.0 - weight / SEEN).max(0.0)])
-        };
-        let [a, from, before, dark_before] = beside(before).unwrap_or_default();
-        let [b, to, after, dark_after] = beside(after).unwrap_or_default();
-        // If both sheets lie on the same side of the point, the point is not between them.
-        if before + after <= 0.0 || before * after > 0.0 && from * to > 0.0 {
-            return Pull::default();
+        let lit = beyond.map(|lines| self.lit(p, lines));
+        let dark = if lit.is_some() { 0.0 } else { DARK };
+        // The slope of the light over the sheet's way, by least squares.
+        let (mut across, mut square, mut dips, mut count, mut forward) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for [before, after] in pairs {
+            let [a, from, before, dark_before] = self.shown_by(p, here, *before).unwrap_or_default();
+            let [b, to, after, dark_after] = self.shown_by(p, here, *after).unwrap_or_default();
+            // If both sheets lie on the same side of the point, the point is not between them.
+            if before + after <= 0.0 || before * after > 0.0 && from * to > 0.0 {
+                continue;
+            }
+            let ends = dark * (dark_before - dark_after);
+            let change = (after * b - before * a) / (before + after).max(1.0) + ends;
+            let way = (after * to - before * from) / (before + after);
+            across += way * change;
+            square += way * way;
+            dips += 0.5 * (a + b) * before.min(after);
+            forward += way;
+            count += 1.0;
         }
-        let ends = DARK * (dark_before - dark_after);
-        let change = (after * b - before * a) / (before + after).max(1.0) + ends;
-        let way = (after * to - before * from) / (before + after);
-        let dip = 0.5 * (a + b) * before.min(after);
+        let way = (square / f64::max(count, 1.0)).sqrt().copysign(forward);
         let per = ray / (ray.dot(&sheet.normal) * way);
-        if per.iter().all(|x| x.is_finite()) { Pull { change, dip, per } } else { Pull::default() }
+        let lit = lit.unwrap_or(1.0);
+        let (change, dip) = (lit * (across / square * way), lit * (dips / f64::max(count, 1.0)));
+        if per.iter().all(|x| x.is_finite()) && change.is_finite() {
+            Pull { change, dip, per }
+        } else {
+            Pull::default()
+        }
     }
 
-    fn pulled(self: Arc<Line>, before: Option<&Line>, after: Option<&Line>) -> Pulled {
-        // Only adjacent shots are neighbours. Across dark and missing shots it is unknown what happened between.
-        let next = |line: &&Line| line.shot.abs_diff(self.shot) == 1;
-        let (before, after) = (before.filter(next), after.filter(next));
-        let pulls =
-            (0..self.points.len()).into_par_iter().with_min_len(64).map(|i| self.pull(i, before, after)).collect();
-        Pulled { line: self, pulls }
+    /// How many shots away neighbours may be, by a point in the middle of this line: the way of the sheet to the next
+    /// shot, in twice its standard deviation. `None` without neighbours.
+    fn far(&self, next: &Line) -> Option<f64> {
+        let p = &self.points[self.order.get(self.order.len() / 2)?.1 as usize];
+        let far = 2.0 * self.sheet_mm / next.place.as_ref()?.sheet.distance(&p.at()).abs();
+        far.is_finite().then_some(far)
+    }
+
+    /// `company` are the lines near this one, in their order. Only shots without a gap between are neighbours: across
+    /// dark and missing shots it is unknown what happened.
+    fn pulled(self: Arc<Line>, company: &VecDeque<Arc<Line>>, reach: u32, ends: u32) -> Pulled {
+        let has = |shot: u32| company.iter().find(|line| line.shot == shot);
+        let unbroken = |way: i64| {
+            let at = |k: i64| u32::try_from(i64::from(self.shot) + way * k).ok().and_then(has);
+            (1..=i64::from(reach.max(ends))).map_while(at).collect::<Vec<_>>()
+        };
+        let (before, after) = (unbroken(-1), unbroken(1));
+        let far = after.first().and_then(|next| self.far(next));
+        let near: Vec<[Option<&Arc<Line>>; 2]> =
+            nearest(reach).map(|k| [before.get(k - 1).copied(), after.get(k - 1).copied()]).collect();
+        // An edge darkens all lines beyond it: every eighth of the distance is enough.
+        let every = (ends as usize).div_ceil(8);
+        let some = |lines: Vec<&Arc<Line>>| lines.into_iter().rev().step_by(every).cloned().collect::<Vec<_>>();
+        let beyond = (ends > 0).then(|| [some(before), some(after)].concat());
+        let pull = |i| self.pull(i, &near, beyond.as_deref());
+        let pulls = (0..self.points.len()).into_par_iter().with_min_len(64).map(pull).collect();
+        Pulled { line: self.clone(), pulls, far }
     }
 }
 
-/// Passes the lines of a cloud, whose points come in the order of their shots, to `take` in that order.
-pub(super) fn lines(cloud: &dyn PointSource, shots: &Shots, take: &mut dyn FnMut(Pulled) -> Result<()>) -> Result<()> {
-    let (mut before, mut last): (Option<Arc<Line>>, Option<Arc<Line>>) = (None, None);
+/// How many shots away the neighbours are that count within a reach: nearer ones add noise and little else.
+pub(super) fn nearest(reach: u32) -> std::ops::RangeInclusive<usize> {
+    reach as usize / 2 + 1..=reach as usize
+}
+
+/// Passes the lines of a cloud, whose points come in the order of their shots, to `take` in that order. Neighbours are
+/// up to `reach` shots away. The light may end up to `ends` shots away; 0 if shots are coarser than the sheet.
+pub(super) fn lines(
+    cloud: &dyn PointSource,
+    shots: &Shots,
+    reach: u32,
+    ends: u32,
+    take: &mut dyn FnMut(Pulled) -> Result<()>,
+) -> Result<()> {
+    let within = reach.max(ends);
+    // The lines within the reach of those that were not passed on yet, and the number of those before them.
+    let (mut near, mut done): (VecDeque<Arc<Line>>, usize) = (VecDeque::new(), 0);
+    let mut pass = |near: &mut VecDeque<Arc<Line>>, upto: u64| -> Result<()> {
+        while near.get(done).is_some_and(|line| u64::from(line.shot) + u64::from(within) <= upto) {
+            take(near[done].clone().pulled(near, reach, ends))?;
+            done += 1;
+            while near.len() > done && near[0].shot + within < near[done].shot {
+                near.pop_front();
+                done -= 1;
+            }
+        }
+        Ok(())
+    };
     let mut next: Vec<CloudPoint> = Vec::new();
     let mut close = |points: Vec<CloudPoint>| -> Result<()> {
-        let line = points.first().map(|p| p.shot).map(|shot| Arc::new(Line::new(shot, points, shots)));
-        let done = last.clone().map_or(Ok(()), |last| take(last.pulled(before.as_deref(), line.as_deref())));
-        before = std::mem::replace(&mut last, line);
-        done
+        let Some(shot) = points.first().map(|p| p.shot) else { return Ok(()) };
+        near.push_back(Arc::new(Line::new(shot, points, shots)));
+        pass(&mut near, shot.into())
     };
     let mut closed = Ok(());
     cloud.for_each_chunk(&mut |points| {
@@ -179,5 +274,5 @@ pub(super) fn lines(cloud: &dyn PointSource, shots: &Shots, take: &mut dyn FnMut
     })?;
     closed?;
     close(next)?;
-    close(Vec::new())
+    pass(&mut near, u64::MAX)
 }

@@ -3,7 +3,7 @@
 //! Frame and unit: the cloud's frame, mm; docs/math.md, Sheets that are thick.
 
 use super::super::slope::{Slope, slope};
-use super::lines::{Pull, Pulled, lines};
+use super::lines::{Pull, Pulled, lines, nearest};
 use crate::fault::Result;
 use crate::scan::{CloudPoint, PointSource, Shots};
 use crate::solve::robust_scale;
@@ -26,6 +26,8 @@ const FEWEST: usize = 256;
 /// Above this number comparisons are thinned out.
 const MOST: usize = 1 << 16;
 const ROUNDS: usize = 5;
+/// Most shots to a neighbour.
+const FARTHEST: u32 = 16;
 
 /// Effect of the sheet's thickness where brightness changes; in scan.json.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -64,6 +66,12 @@ pub struct Thick {
     /// Remaining scatter of the points about that effect, as a variance of the sheet, mm².
     left: f64,
     quiet: Quiet,
+    /// Number of shots to the neighbours that showed it.
+    reach: u32,
+    /// Number of shots to the points that they were compared with.
+    apart: u32,
+    /// Mean square of what is left of the comparisons, in their stated deviations; edges are clamped.
+    rest: f64,
 }
 
 /// Limits of changes and dips that are speckle and noise.
@@ -94,13 +102,45 @@ struct Between {
 
 impl Thick {
     /// Examines a cloud in the order of its shots. `None` if the sheet is not recorded, or if the cloud does not
-    /// show that brightness shifts its points.
+    /// show that brightness shifts its points. Where shots are finer than the sheet, the brightness hardly changes from
+    /// one to the next, and what does is noise: of neighbours farther away those count that leave the least.
     pub fn of(cloud: &dyn PointSource, shots: &Shots) -> Result<Option<Thick>> {
+        let (adjacent, far, noise) = Thick::by(cloud, shots, 1, 1, UNCHANGED)?;
+        let powers = || (0..).map(|k| 1 << k).take_while(|reach| *reach <= FARTHEST && f64::from(*reach) <= far);
+        let apart = powers().last().unwrap_or(1);
+        if apart == 1 {
+            return Ok(adjacent);
+        }
+        let mut best: Option<Thick> = None;
+        for reach in powers() {
+            let most = UNCHANGED.max(SPECKLE * noise / (nearest(reach).count() as f64).sqrt());
+            let thick = Thick::by(cloud, shots, reach, apart, most)?.0;
+            let rest = |thick: &Option<Thick>| thick.map_or(f64::INFINITY, |thick| thick.rest);
+            if rest(&thick) < rest(&best) {
+                best = thick;
+            }
+        }
+        Ok(best)
+    }
+
+    /// What neighbours up to `reach` shots away show by comparisons with points `apart` shots away, where `most` bounds
+    /// the changes that count as noise; how many shots away neighbours may be; and the noise of a change. A dip has
+    /// the noise of three independent lights where a change has that of one.
+    fn by(
+        cloud: &dyn PointSource,
+        shots: &Shots,
+        reach: u32,
+        apart: u32,
+        most: f64,
+    ) -> Result<(Option<Thick>, f64, f64)> {
         let (mut all, mut every, mut seen) = (Vec::new(), 1, 0_usize);
-        let mut three: VecDeque<Pulled> = VecDeque::new();
-        lines(cloud, shots, &mut |line| {
-            three.push_back(line);
-            if let [before, line, after] = three.make_contiguous() {
+        let (mut near, mut far): (VecDeque<Pulled>, Vec<f64>) = (VecDeque::new(), Vec::new());
+        let apart = apart as usize;
+        lines(cloud, shots, reach, ends_of(reach, apart as u32), &mut |line| {
+            far.extend(line.far);
+            near.push_back(line);
+            if near.len() == 2 * apart + 1 {
+                let (before, line, after) = (&near[0], &near[apart], &near[2 * apart]);
                 for i in 0..line.pulls.len() {
                     let Some(between) = between(before, line, i, after) else { continue };
                     if seen.is_multiple_of(every) {
@@ -113,26 +153,36 @@ impl Thick {
                         every *= 2;
                     }
                 }
-                three.pop_front();
+                near.pop_front();
             }
             Ok(())
         })?;
+        far.sort_by(f64::total_cmp);
+        let far = far.get(far.len() / 2).copied().unwrap_or(0.0);
         if all.len() < FEWEST {
-            return Ok(None);
+            return Ok((None, far, 0.0));
         }
         let scale = |of: fn(&Part) -> f64| {
             let mut sizes: Vec<f64> = all.iter().map(|b: &Between| of(&b.parts[0]).abs()).collect();
-            (SPECKLE * robust_scale(&mut sizes, 1)).min(UNCHANGED)
+            robust_scale(&mut sizes, 1)
         };
-        let quiet = Quiet { change: scale(|p| p.change), dip: scale(|p| p.dip) };
+        let (change, dip) = (scale(|p| p.change), scale(|p| p.dip));
+        let quiet = Quiet { change: (SPECKLE * change).min(most), dip: (SPECKLE * dip).min(most) };
+        Ok((Thick::shown(&all, [reach, apart as u32], quiet), far, change.min(dip / 3f64.sqrt())))
+    }
+
+    /// What comparisons show.
+    fn shown(all: &[Between], [reach, apart]: [u32; 2], quiet: Quiet) -> Option<Thick> {
         let pulls = |b: &Between| b.parts.iter().map(|p| quiet.change_of(p.change) * p.by).sum::<f64>();
         let pairs: Vec<[f64; 2]> = all.iter().map(|b| [-pulls(b), b.beyond]).collect();
-        let Some(square) = slope(&pairs).filter(Slope::sure) else { return Ok(None) };
+        let square = slope(&pairs).filter(Slope::sure)?;
         let unsure = |b: &Between| b.parts.iter().map(|p| (quiet.unsure(p.change, p.dip) * p.by).powi(2)).sum::<f64>();
-        let rest = |(b, [expected, seen]): (&Between, &[f64; 2])| [unsure(b), seen - square.is * expected, b.stated];
-        let rests: Vec<[f64; 3]> = all.iter().zip(&pairs).map(rest).collect();
+        let of_pair = |(b, [expected, seen]): (&Between, &[f64; 2])| [unsure(b), seen - square.is * expected, b.stated];
+        let rests: Vec<[f64; 3]> = all.iter().zip(&pairs).map(of_pair).collect();
         let left = left(&rests, square.is);
-        Ok(Some(Thick { square, left, quiet }))
+        let over = rests.iter().map(|[_, rest, stated]| (rest * rest / stated).min(EDGE * EDGE));
+        let rest = over.sum::<f64>() / rests.len() as f64;
+        Some(Thick { square, left, quiet, reach, apart, rest })
     }
 
     /// Passes the corrected points to `take`, line by line in their order.
@@ -143,7 +193,7 @@ impl Thick {
         take: &mut dyn FnMut(&[CloudPoint]) -> Result<()>,
     ) -> Result<SheetFound> {
         let (mut moved, mut points, mut all) = (0_u64, Vec::new(), 0_u64);
-        lines(cloud, shots, &mut |Pulled { line, pulls }| {
+        lines(cloud, shots, self.reach, ends_of(self.reach, self.apart), &mut |Pulled { line, pulls, .. }| {
             points.clear();
             for (p, Pull { change, dip, per }) in line.points.iter().zip(&pulls) {
                 let by = per * (self.quiet.change_of(*change) * self.square.is);
@@ -175,6 +225,11 @@ impl Quiet {
     fn unsure(&self, change: f64, dip: f64) -> f64 {
         self.change_of(change).hypot(beyond(dip, self.dip))
     }
+}
+
+/// How far away the light's end is looked for, if points are compared with those that many shots away.
+fn ends_of(reach: u32, apart: u32) -> u32 {
+    if apart > 1 { reach + apart } else { 0 }
 }
 
 /// Soft threshold: 0 within `size`, the number itself beyond twice `size`, and linear between the two. It has no
@@ -316,7 +371,7 @@ mod tests {
                     let ray = ray / light;
                     let depth = sheet().offset / sheet().normal.dot(&ray);
                     let at = place.point(&(ray * depth)) + Vec3::z() * (NOISE_MM * noise.normal());
-                    let (u, v) = (column as f32, 200.0 + (self.focal_px * ray.y) as f32);
+                    let (u, v) = ((self.focal_px * ray.x) as f32, 200.0 + (self.focal_px * ray.y) as f32);
                     let (u, v) = if self.along == Along::U { (u, v) } else { (v, u) };
                     let intensity = (8.0 * laser * light * (self.speckle * noise.normal()).exp()) as f32;
                     let position = glam::DVec3::from_array(at.into()).as_vec3();
@@ -361,8 +416,8 @@ mod tests {
         }
     }
 
-    /// Lying and upright stripes, forwards and back, straight and turning, with shots 1 to 4 standard deviations of
-    /// the sheet apart.
+    /// Lying and upright stripes, forwards and back, straight and turning, with shots a quarter to 4 standard
+    /// deviations of the sheet apart.
     #[test]
     fn print_no_longer_pulls_the_points_about() {
         for (name, scene) in [
@@ -372,6 +427,9 @@ mod tests {
             ("turning", Scene { turn: 0.004, ..PRINTED }),
             ("fine", Scene { step: 0.1, shots: 150, ..PRINTED }),
             ("coarse", Scene { step: 0.35, ..PRINTED }),
+            ("dense", Scene { focal_px: 1500.0, step: 0.025, shots: 400, ..PRINTED }),
+            ("dense, back, upright", Scene { focal_px: 1500.0, step: -0.025, shots: 400, along: Along::V, ..PRINTED }),
+            ("dense, speckled", Scene { focal_px: 1500.0, step: 0.025, shots: 400, speckle: 0.06, ..PRINTED }),
             ("thick", Scene { thick: 0.2, ..PRINTED }),
             ("thin", Scene { thick: 0.06, ..PRINTED }),
             ("flickering", Scene { flicker: 0.03, ..PRINTED }),
@@ -458,8 +516,12 @@ mod tests {
             ("thin", thin),
             ("ridges", ridges),
             ("few", Scene { shots: 3, ..PRINTED }),
+            ("dense, speckled", Scene { focal_px: 1500.0, step: 0.025, shots: 300, speckle: 0.3, ..even }),
+            ("dense, flickering", Scene { focal_px: 1500.0, step: 0.025, shots: 300, flicker: 0.2, ..even }),
+            ("dense, thin", Scene { step: 0.025, shots: 300, ..thin }),
+            ("dense ridges", Scene { step: 0.025, shots: 300, ..ridges }),
         ] {
-            for seed in 0..5 {
+            for seed in 0..if scene.shots > 60 { 2 } else { 5 } {
                 let (found, before, after) = scene.refined(seed);
                 println!("{name}: {found:?}: {before:.4} -> {after:.4}");
                 assert!(found.is_none() && before == after, "{name}: {found:?}: {before} -> {after}");
