@@ -176,6 +176,13 @@ fn a_program_drives_a_scan_as_the_documents_show() {
 }
 
 #[test]
+fn a_client_made_from_the_description_drives_a_scan() {
+    let dir = copy();
+    let description = source("docs/openapi.json");
+    python("tests/web/client.py", &[program(), dir.path().to_str().unwrap(), description.to_str().unwrap()]);
+}
+
+#[test]
 fn a_live_picture_is_the_newest_with_its_peaks_and_all_others_are_counted() {
     let dir = copy();
     python("tests/web/live.py", &[program(), dir.path().to_str().unwrap()]);
@@ -287,21 +294,29 @@ fn messages_and_routes_are_described_as_they_are() {
     same("docs/messages.d.ts", &messages);
     let api = sheetlight::web::openapi();
     same("docs/openapi.json", &format!("{}\n", serde_json::to_string_pretty(&api).unwrap()));
-    // Every message that a route names is declared.
-    let mut named = Vec::new();
-    fn walk(value: &serde_json::Value, out: &mut Vec<String>) {
+    // Every message that is named is described, and operations have names of their own.
+    let (mut named, mut operations) = (Vec::new(), Vec::new());
+    fn walk(value: &serde_json::Value, key: &str, out: &mut Vec<String>) {
         match value {
             serde_json::Value::Object(map) => map.iter().for_each(|(k, v)| match v {
-                serde_json::Value::String(name) if k == "x-message" => out.push(name.clone()),
-                v => walk(v, out),
+                serde_json::Value::String(name) if k == key => out.push(name.clone()),
+                v => walk(v, key, out),
             }),
-            serde_json::Value::Array(list) => list.iter().for_each(|v| walk(v, out)),
+            serde_json::Value::Array(list) => list.iter().for_each(|v| walk(v, key, out)),
             _ => {}
         }
     }
-    walk(&api, &mut named);
-    assert!(named.len() > 20, "{named:?}");
+    walk(&api, "$ref", &mut named);
+    walk(&api, "operationId", &mut operations);
+    assert!(named.len() > 100, "{named:?}");
     for name in named {
-        assert!(messages.contains(&format!("export type {name} =")), "{name} is not declared");
+        let message = name.strip_prefix("#/components/schemas/").expect("a message's name");
+        let schema = &api["components"]["schemas"][message];
+        assert!(schema.is_object(), "{name} is not described");
+        assert!(message == "Fault" || messages.contains(&format!("export type {message} =")), "{name} is not declared");
     }
+    let count = operations.len();
+    operations.sort();
+    operations.dedup();
+    assert!(count > 50 && operations.len() == count, "{operations:?}");
 }

@@ -1,30 +1,31 @@
-//! In: the table of routes, the messages' declarations. Out: their description in OpenAPI 3.1, stored as
-//! docs/openapi.json.
+//! In: the table of routes, the messages' schemas. Out: their description in OpenAPI 3.1, stored as docs/openapi.json.
 //! Frame and unit: none.
 
 use super::routes::{ROOT, Route, routes};
+use crate::web::message::schemas;
 use serde_json::{Map, Value, json};
 
-/// The OpenAPI description. It names messages by `x-message`; docs/messages.d.ts declares them.
+/// The OpenAPI description, from which programs generate clients.
 pub fn openapi() -> Value {
+    let mut schemas = schemas();
+    schemas.insert("Fault".into(), fault());
     let mut paths: Map<String, Value> = Map::new();
     for r in routes() {
         let path = format!("{ROOT}{}", r.path.replace("{*", "{"));
         let at = paths.entry(path).or_insert_with(|| json!({}));
-        at[r.method.to_lowercase()] = operation(&r);
+        at[r.method.to_lowercase()] = operation(&r, &schemas);
     }
     json!({
         "openapi": "3.1.0",
         "info": {
             "title": "sheetlight station",
             "version": "1",
-            "description": "The operator's screen. Messages are declared in docs/messages.d.ts. Every request \
-                            carries a session's cookie or 'Authorization: Bearer TOKEN', and 'X-Sheetlight-Tab' \
-                            with a name of the caller's own where it operates. Faults: {\"error\": Problem}.",
+            "description": "The operator's screen. Every request carries a session's cookie or 'Authorization: Bearer \
+                            TOKEN', and 'X-Sheetlight-Tab' with a name of the caller's own where it operates.",
             "license": { "name": "MIT OR Apache-2.0" },
         },
         "paths": paths,
-        "components": { "securitySchemes": {
+        "components": { "schemas": schemas, "securitySchemes": {
             "token": { "type": "http", "scheme": "bearer" },
             "session": { "type": "apiKey", "in": "cookie", "name": "sheetlight" },
         } },
@@ -32,46 +33,71 @@ pub fn openapi() -> Value {
     })
 }
 
-fn operation(r: &Route) -> Value {
+/// Body of an answer that is not 2xx.
+fn fault() -> Value {
+    json!({
+        "description": "Body of every answer with a status of 4xx or 5xx.",
+        "type": "object",
+        "properties": { "error": { "$ref": reference("Problem") } },
+        "required": ["error"],
+    })
+}
+
+fn reference(message: &str) -> String {
+    format!("#/components/schemas/{message}")
+}
+
+fn operation(r: &Route, schemas: &Map<String, Value>) -> Value {
     let names = r.path.split('/').filter_map(|w| w.strip_prefix('{')?.strip_suffix('}'));
-    let mut parameters: Vec<Value> = names
-        .map(|n| {
-            json!({ "name": n.trim_start_matches('*'), "in": "path", "required": true,
-            "schema": { "type": "string" } })
-        })
-        .collect();
+    let parameter = |name: &str, at: &str, required: bool, schema: Value| json!({ "name": name, "in": at, "required": required, "schema": schema });
+    let string = || json!({ "type": "string" });
+    let mut parameters: Vec<Value> =
+        names.map(|n| parameter(n.trim_start_matches('*'), "path", true, string())).collect();
     if let Some(message) = r.takes.strip_prefix('?') {
-        parameters
-            .push(json!({ "name": "query", "in": "query", "schema": { "type": "object", "x-message": message } }));
+        let required = schemas[message]["required"].as_array();
+        let needs = |key: &str| required.is_some_and(|required| required.iter().any(|r| r == key));
+        let properties = schemas[message]["properties"].as_object().expect("a query has named values");
+        parameters.extend(properties.iter().map(|(k, schema)| parameter(k, "query", needs(k), schema.clone())));
     }
     if r.lease {
-        parameters.push(
-            json!({ "name": "X-Sheetlight-Tab", "in": "header", "required": true, "schema": { "type": "string" } }),
-        );
+        parameters.push(parameter("X-Sheetlight-Tab", "header", true, string()));
     }
     let (kind, schema) = match r.gives {
         "" => ("application/json", json!({})),
         media if media.contains('/') => (media, json!({ "type": "string", "format": "binary" })),
         name => match name.strip_suffix("[]") {
-            Some(item) => {
-                ("application/json", json!({ "type": "array", "items": { "type": "object", "x-message": item } }))
-            }
-            None => ("application/json", json!({ "type": "object", "x-message": name })),
+            Some(item) => ("application/json", json!({ "type": "array", "items": { "$ref": reference(item) } })),
+            None => ("application/json", json!({ "$ref": reference(name) })),
         },
     };
-    let problem = json!({ "schema": { "x-message": "Problem" } });
-    let fault = json!({ "description": "a fault", "content": { "application/json": problem } });
+    let fault = json!({
+        "description": "a fault",
+        "content": { "application/json": { "schema": { "$ref": reference("Fault") } } },
+    });
     let mut out = json!({
+        "operationId": name(r),
         "summary": r.does,
         "parameters": parameters,
-        "responses": { "200": { "description": "done", "content": { kind: { "schema": schema } } }, "4XX": fault },
+        "responses": {
+            "200": { "description": "done", "content": { kind: { "schema": schema } } },
+            "4XX": fault,
+            "5XX": fault,
+        },
     });
     if !r.takes.is_empty() && !r.takes.starts_with('?') {
-        out["requestBody"] =
-            json!({ "content": { "application/json": { "schema": { "type": "object", "x-message": r.takes } } } });
+        out["requestBody"] = json!({
+            "required": true,
+            "content": { "application/json": { "schema": { "$ref": reference(r.takes) } } },
+        });
     }
     if r.path == "/session" && r.method == "POST" {
         out["security"] = json!([]);
     }
     out
+}
+
+/// Name of an operation in clients: its method and its path's words.
+fn name(r: &Route) -> String {
+    let words = r.path.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
+    words.fold(r.method.to_lowercase(), |name, word| format!("{name}_{word}"))
 }

@@ -1,12 +1,13 @@
 //! In: nothing. Out: the content of the bar that every page shows.
 //! Frame and unit: counts of frames; ms, days, mm, GB as the names say.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use ts_rs::TS;
 
 /// Source of the pictures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, TS)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, TS, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
     /// A running camera.
@@ -18,7 +19,7 @@ pub enum Mode {
 }
 
 /// What the robot may do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, TS)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, TS, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RobotState {
     /// No robot is configured, or it does not answer.
@@ -32,7 +33,7 @@ pub enum RobotState {
 }
 
 /// Frames of the running scan, or of the last one.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, TS, JsonSchema)]
 pub struct Frames {
     /// Passed to the processing stages.
     #[ts(type = "number")]
@@ -46,7 +47,7 @@ pub struct Frames {
 }
 
 /// Age of the rig's oldest calibration, and the error expected from all of them.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct CalibrationAge {
     /// Days since the oldest record was measured.
     pub days: f64,
@@ -60,7 +61,7 @@ pub struct CalibrationAge {
 }
 
 /// The tab that may operate.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, TS, JsonSchema)]
 pub struct Lease {
     /// A short name of the tab that holds the lease; null: no tab holds it.
     pub holder: Option<String>,
@@ -69,7 +70,7 @@ pub struct Lease {
 }
 
 /// The bar.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct Bar {
     /// Source of the pictures.
     pub mode: Mode,

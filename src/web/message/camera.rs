@@ -3,18 +3,19 @@
 //! stripe's length.
 
 use crate::capture::{Feature, Look, Range, Value, WANTED};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
 
 /// The camera.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct CameraState {
     /// Its settings; empty if it has none, or while it is not connected.
     pub features: Vec<CameraFeature>,
 }
 
 /// One setting of a camera.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct CameraFeature {
     /// Name of the feature by the standard naming convention.
     pub name: String,
@@ -46,7 +47,7 @@ impl From<&Feature> for CameraFeature {
 }
 
 /// A setting to change.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SetFeature {
     /// Name of the feature by the standard naming convention, e.g. ExposureTime.
@@ -56,7 +57,7 @@ pub struct SetFeature {
 }
 
 /// Measures of a picture.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct PictureLook {
     /// Lowest, median, 99th percentile and highest grey level.
     pub levels: [u16; 4],
@@ -67,7 +68,7 @@ pub struct PictureLook {
 }
 
 /// Measures of a stripe across its direction.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct StripeSeen {
     /// The stripe is horizontal, so it is measured column by column.
     pub lying: bool,
@@ -108,7 +109,7 @@ impl From<&Look> for PictureLook {
 }
 
 /// Result of the automatic exposure.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct ExposureSet {
     /// The exposure that was set, us.
     pub exposure_us: f64,

@@ -1,11 +1,12 @@
 //! In: nothing. Out: how a session is opened, which tab operates, and how a motion is confirmed.
 //! Frame and unit: motions by their hash.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
 
 /// Opens a session by one of these two.
-#[derive(Deserialize, TS)]
+#[derive(Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[derive(Default)]
 pub struct Knock {
@@ -16,14 +17,14 @@ pub struct Knock {
 }
 
 /// A session.
-#[derive(Serialize, TS)]
+#[derive(Serialize, TS, JsonSchema)]
 pub struct Session {
     /// A short name of the tab that sent the request.
     pub tab: String,
 }
 
 /// Takes the lease for this tab.
-#[derive(Default, Deserialize, TS)]
+#[derive(Default, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TakeLease {
     /// Takes it even if another tab operates.
@@ -31,7 +32,7 @@ pub struct TakeLease {
 }
 
 /// What a person confirms by holding the button.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Confirmed {
     /// The job that proposes the motion.
@@ -41,14 +42,14 @@ pub struct Confirmed {
 }
 
 /// A confirmation of one motion.
-#[derive(Serialize, TS)]
+#[derive(Serialize, TS, JsonSchema)]
 pub struct Grant {
     /// The name under which the confirmation is redeemed once.
     pub grant: String,
 }
 
 /// The button was held.
-#[derive(Deserialize, TS)]
+#[derive(Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Redeem {
     /// The grant that pressing the button returned.

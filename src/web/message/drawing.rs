@@ -2,11 +2,12 @@
 //! Frame and unit: part frame, mm, degrees.
 
 use super::RecipeText;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
 
 /// A drawing, and the recipe to make from it.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DrawingAsk {
     /// Name of the recipe.
@@ -40,7 +41,7 @@ pub struct DrawingAsk {
 }
 
 /// A recipe's text, and the change to its constructed points.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PointsChange {
     /// TOML; it need not be stored.
@@ -50,7 +51,7 @@ pub struct PointsChange {
 }
 
 /// A change to a recipe's constructed points.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PointChange {
     /// Adds a point, after those that it may be built from.
@@ -68,7 +69,7 @@ pub enum PointChange {
 }
 
 /// A point to be constructed.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewPoint {
     /// The name by which later points and the insertion refer to it.
@@ -88,7 +89,7 @@ pub struct NewPoint {
 }
 
 /// A recipe's text after a change of its points.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct PointsChanged {
     /// TOML, with all its comments.
     pub text: String,
@@ -97,7 +98,7 @@ pub struct PointsChanged {
 }
 
 /// The text of a recipe being edited.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PointsOf {
     /// TOML.
@@ -105,7 +106,7 @@ pub struct PointsOf {
 }
 
 /// A point of a recipe.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct RecipePoint {
     /// The name by which constructions and the insertion refer to it.
     pub name: String,
@@ -118,7 +119,7 @@ pub struct RecipePoint {
 }
 
 /// What was read from a drawing.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct DrawingRead {
     /// The recipe, as stored.
     pub recipe: RecipeText,

@@ -2,11 +2,12 @@
 //! Frame and unit: the height map's grid frame, mm.
 
 use crate::scan;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
 
 /// A filter. It removes cells; the remaining ones keep their measured values.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(tag = "filter", rename_all = "snake_case")]
 pub enum Filter {
     /// Removes cells whose stated standard deviation is larger than this.
@@ -53,7 +54,7 @@ impl From<Filter> for scan::Filter {
 }
 
 /// The filters applied when a scan is viewed; all answers about its surface use them.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Filters {
     /// In the order in which they are applied.
@@ -61,7 +62,7 @@ pub struct Filters {
 }
 
 /// Result of the filters.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct Filtered {
     /// In the order in which they are applied.
     pub filters: Vec<Filter>,
@@ -72,7 +73,7 @@ pub struct Filtered {
 }
 
 /// A filtered scan to be stored as a new scan.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FilterOrder {
     /// The job that made the scan.

@@ -3,11 +3,12 @@
 
 use super::{Bar, MotionState, Order, Outcome};
 use crate::fault::{Fault, Kind};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
 
 /// State of a job.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, TS)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JobState {
     /// Waits for earlier jobs.
@@ -29,7 +30,7 @@ const MAKE_ROOM: &str = "take old jobs away on the page Replay (the × behind ea
                          resume this job, or order it again";
 
 /// A fault as pages show it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct Problem {
     /// usage, input, refused, output or device.
     pub kind: String,
@@ -57,7 +58,7 @@ impl From<&Fault> for Problem {
 }
 
 /// One run of a procedure; `job.json` in its folder holds it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Job {
     /// Version of job.json: 1.
@@ -85,7 +86,7 @@ pub struct Job {
 }
 
 /// An event sent over a page's WebSocket.
-#[derive(Clone, Debug, Serialize, TS)]
+#[derive(Clone, Debug, Serialize, TS, JsonSchema)]
 #[serde(tag = "event", content = "data", rename_all = "snake_case")]
 pub enum Event {
     /// Sent first, and again after events were missed: the complete state.

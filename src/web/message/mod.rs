@@ -4,6 +4,7 @@
 
 mod bar;
 mod camera;
+mod description;
 mod door;
 mod drawing;
 mod filter;
@@ -15,10 +16,10 @@ mod place;
 mod settings;
 mod surface;
 mod sweep;
-mod typescript;
 
 pub use bar::{Bar, CalibrationAge, Frames, Lease, Mode, RobotState};
 pub use camera::{CameraFeature, CameraState, ExposureSet, PictureLook, SetFeature, StripeSeen};
+pub use description::{declarations, schemas};
 pub use door::{Confirmed, Grant, Knock, Redeem, Session, TakeLease};
 pub use drawing::{DrawingAsk, DrawingRead, NewPoint, PointChange, PointsChange, PointsChanged, PointsOf, RecipePoint};
 pub use filter::{Filter, FilterOrder, Filtered, Filters};
@@ -42,4 +43,3 @@ pub use surface::{
     SectionPoint,
 };
 pub use sweep::{Pace, SweepAsk, SweepPlan};
-pub use typescript::declarations;

@@ -3,11 +3,12 @@
 //! Frame and unit: base frame; mm, degrees as the labels say, mm/s, s.
 
 use super::GateLight;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
 
 /// A motion that waits for confirmation, as it is shown.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct Asked {
     /// The job that proposes it.
     pub job: String,
@@ -38,7 +39,7 @@ pub struct Asked {
 }
 
 /// The simulated cell, if there is one.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct SimulatedCell {
     /// Parts that have a component for the gripper.
     pub parts: Vec<String>,
@@ -49,7 +50,7 @@ pub struct SimulatedCell {
 }
 
 /// The robot's state for motions.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, TS, JsonSchema)]
 pub struct MotionState {
     /// A robot is configured.
     pub robot: bool,
@@ -76,7 +77,7 @@ pub struct MotionState {
 }
 
 /// Arms or disarms the robot.
-#[derive(Clone, Copy, Debug, Deserialize, TS)]
+#[derive(Clone, Copy, Debug, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Arming {
     /// False: disarms it.
@@ -84,7 +85,7 @@ pub struct Arming {
 }
 
 /// An action of a person in the simulated cell.
-#[derive(Clone, Debug, Deserialize, TS)]
+#[derive(Clone, Debug, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InTheCell {
     /// Puts the component of this part into the gripper; null: the gripper keeps its component.

@@ -2,13 +2,14 @@
 //! Frame and unit: mm, degrees; positions in a height map's grid.
 
 use super::FilterOrder;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use ts_rs::TS;
 
 /// A procedure with its inputs. Recordings are named by their path below the recordings' folder, scans by their
 /// job.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(tag = "procedure", rename_all = "snake_case")]
 pub enum Order {
     /// Checks station, disk and adapters, and every GPU stage against its CPU twin.
@@ -40,12 +41,12 @@ pub enum Order {
 }
 
 /// No further input.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Plain {}
 
 /// Inputs of the benchmark.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BenchmarkOrder {
     /// Frame rate of the camera whose drops are counted, Hz; null: 30.
@@ -55,7 +56,7 @@ pub struct BenchmarkOrder {
 }
 
 /// The recording to scan, and the settings.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ScanOrder {
     /// Path of the recording.
@@ -78,7 +79,7 @@ pub struct ScanOrder {
 }
 
 /// What to find, and in which scans.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FindOrder {
     /// Jobs that scanned.
@@ -93,7 +94,7 @@ pub struct FindOrder {
 }
 
 /// The recording of a touched surface.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TouchOrder {
     /// Path of the recording of the pointer.
@@ -101,7 +102,7 @@ pub struct TouchOrder {
 }
 
 /// What to calibrate, and from which recording.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CalibrateOrder {
     /// What to calibrate.
@@ -114,7 +115,7 @@ pub struct CalibrateOrder {
 }
 
 /// The recordings for a joint calibration.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JointOrder {
     /// Recordings of boards.
@@ -122,7 +123,7 @@ pub struct JointOrder {
 }
 
 /// A calibration that moves the robot itself.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AutoOrder {
     /// Name of the board's description in the station's folder `boards`.
@@ -136,7 +137,7 @@ pub struct AutoOrder {
 }
 
 /// An insertion.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InsertOrder {
     /// Name of the recipe.
@@ -155,7 +156,7 @@ pub struct InsertOrder {
 }
 
 /// Target of a calibration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, TS)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Target {
     /// Camera and lens.
@@ -171,7 +172,7 @@ pub enum Target {
 }
 
 /// A part taught by a few positions in a height map.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TeachOrder {
     /// The job that scanned it.

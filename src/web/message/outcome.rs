@@ -2,12 +2,13 @@
 //! Frame and unit: mm, degrees, px; poses in the scan's frame.
 
 use super::ExposureSet;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use ts_rs::TS;
 
 /// Result of a job.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(tag = "procedure", rename_all = "snake_case")]
 pub enum Outcome {
     /// Results of the checks.
@@ -52,7 +53,7 @@ pub enum Outcome {
 }
 
 /// One check.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct CheckLine {
     /// station, camera, robot, gpu, disk or clock.
     pub group: String,
@@ -65,7 +66,7 @@ pub struct CheckLine {
 }
 
 /// Figures of a scan; scan.json has more.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct ScanFigures {
     /// Shots processed, skipped ones included.
     pub shots: usize,
@@ -107,7 +108,7 @@ pub struct ScanFigures {
 }
 
 /// The tool's poses for an insertion.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct Position {
     /// Name of the recipe.
     pub recipe: String,
@@ -148,7 +149,7 @@ pub struct Position {
 }
 
 /// The poses of one insertion.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct RobotPoses {
     /// Hash of all numbers here: a confirmation identifies the shown poses by it.
     pub hash: String,
@@ -167,7 +168,7 @@ pub struct RobotPoses {
 }
 
 /// A pose in one vendor's convention.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct Notation {
     /// Name of the convention.
     pub name: String,
@@ -178,7 +179,7 @@ pub struct Notation {
 }
 
 /// A contribution to the uncertainty.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct Term {
     /// Name of the contribution.
     pub name: String,
@@ -191,7 +192,7 @@ pub struct Term {
 }
 
 /// A gate and its result.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct GateLight {
     /// The judged quantity, with its unit.
     pub name: String,
@@ -210,7 +211,7 @@ impl From<&crate::fault::Gate> for GateLight {
 }
 
 /// A completed insertion.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct Inserted {
     /// Time from the start to the confirmed position, s.
     pub time_to_position_s: Option<f64>,
@@ -225,7 +226,7 @@ pub struct Inserted {
 }
 
 /// A pose in which the tool is square to the touched surface, at its position in the last shot.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct SquareProposed {
     /// Tilt of the tool in the last shot, degrees.
     pub tilt_deg: f64,
@@ -242,7 +243,7 @@ pub struct SquareProposed {
 }
 
 /// The touched surface.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct Touched {
     /// For each spot: picture, distance from the camera along its axis and its standard deviation, mm.
     pub spots: Vec<(String, f64, f64)>,
@@ -258,7 +259,7 @@ pub struct Touched {
 }
 
 /// A plane through touched spots.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct SurfaceTouched {
     /// Unit normal towards the camera; base frame.
     pub normal: [f64; 3],
@@ -275,7 +276,7 @@ pub struct SurfaceTouched {
 }
 
 /// Figures of a calibration.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct CalibrationFigures {
     /// Kind of calibration, as named in files.
     pub kind: String,
@@ -300,7 +301,7 @@ pub struct CalibrationFigures {
 }
 
 /// Fates of a camera's pictures while the newest one was measured repeatedly.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct KeptUp {
     /// Adapter or processor.
     pub on: String,
@@ -327,7 +328,7 @@ pub struct KeptUp {
 }
 
 /// Jobs that found the same part repeatedly.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RepeatsAsk {
     /// Names of the jobs.
@@ -335,7 +336,7 @@ pub struct RepeatsAsk {
 }
 
 /// Repeatability of a part's pose.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct Repeats {
     /// Number of poses.
     pub places: usize,
@@ -344,7 +345,7 @@ pub struct Repeats {
 }
 
 /// Repeatability along one axis, or of the rotation.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct Spread {
     /// x, y, z of the frame, or turn.
     pub name: String,
@@ -379,7 +380,7 @@ impl Repeats {
 }
 
 /// Time per shot.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 pub struct BenchRow {
     /// Adapter or processor.
     pub on: String,

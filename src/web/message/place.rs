@@ -2,11 +2,12 @@
 //! Frame and unit: px, mm, days.
 
 use super::{Mode, Problem};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
 
 /// The station.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct StationInfo {
     /// Its name.
     pub name: String,
@@ -36,7 +37,7 @@ pub struct StationInfo {
 }
 
 /// Pose of a frame.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct FrameInfo {
     /// tool or camera.
     pub name: String,
@@ -49,7 +50,7 @@ pub struct FrameInfo {
 }
 
 /// Whether the support file includes pictures.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SupportAsk {
     /// A person ticked the option.
@@ -58,7 +59,7 @@ pub struct SupportAsk {
 }
 
 /// A calibration of the station.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct CalibrationState {
     /// Name in files.
     pub kind: String,
@@ -75,7 +76,7 @@ pub struct CalibrationState {
 }
 
 /// A recording.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct RecordingInfo {
     /// Path below the recordings' folder.
     pub name: String,
@@ -98,7 +99,7 @@ pub struct RecordingInfo {
 }
 
 /// A picture of a calibration board.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct BoardView {
     /// Name of the picture.
     pub name: String,
@@ -119,7 +120,7 @@ pub struct BoardView {
 }
 
 /// A picture of a recording of boards.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ViewRef {
     /// The recording.
@@ -129,7 +130,7 @@ pub struct ViewRef {
 }
 
 /// A picture of a recording.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PictureRef {
     /// The recording.
@@ -145,7 +146,7 @@ pub struct PictureRef {
 }
 
 /// A recipe as text.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct RecipeText {
     /// Name of the file, without extension.
     pub name: String,
@@ -160,7 +161,7 @@ pub struct RecipeText {
 }
 
 /// A recipe to be stored. Other keys of a listed recipe may be sent too; they are ignored.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 pub struct RecipeAsk {
     /// TOML.
     pub text: String,

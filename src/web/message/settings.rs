@@ -1,12 +1,13 @@
 //! In: nothing. Out: a station's settings, changes to them, its backups, an output to try.
 //! Frame and unit: as docs/file-formats.md states for each setting.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use ts_rs::TS;
 
 /// The station's settings, and related data.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct SettingsState {
     /// The text of station.toml.
     pub text: String,
@@ -30,7 +31,7 @@ pub struct SettingsState {
 }
 
 /// A link to another program.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, TS, JsonSchema)]
 pub struct Connection {
     /// mqtt: this program connects to a broker; modbus: PLCs connect to it.
     pub door: String,
@@ -53,7 +54,7 @@ pub struct Connection {
 }
 
 /// A backup in the station's folder `backups`.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct BackupInfo {
     /// Name of its file.
     pub name: String,
@@ -67,7 +68,7 @@ pub struct BackupInfo {
 }
 
 /// Changes to the settings: a whole text, or single settings. If one change is invalid, none is made.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SettingsAsk {
     /// SHA-256 of the text that this change was made from.
@@ -81,7 +82,7 @@ pub struct SettingsAsk {
 }
 
 /// An output of the controller to try.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OutputAsk {
     /// line, pointer or room: on for a moment; open or close: the gripper.

@@ -1,12 +1,13 @@
 //! In: nothing. Out: height maps, sections and measurements, as pages request them.
 //! Frame and unit: the height map's grid frame, mm, degrees.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
 
 /// Description of a map's layers; each layer is `width * height` floats, little endian, row 0 first, NaN if
 /// missing.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct MapHead {
     /// Columns.
     pub width: u32,
@@ -25,7 +26,7 @@ pub struct MapHead {
 }
 
 /// Outlines of a found part.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct Outlines {
     /// Frame of the scan: base, axis, flange or map.
     pub frame: String,
@@ -34,7 +35,7 @@ pub struct Outlines {
 }
 
 /// The same outlines as the camera on the gripper sees them.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct Ghost {
     /// Number of the picture that they belong to.
     #[ts(type = "number")]
@@ -47,7 +48,7 @@ pub struct Ghost {
 }
 
 /// A line over the map.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SectionAsk {
     /// Start, mm.
@@ -60,7 +61,7 @@ pub struct SectionAsk {
 }
 
 /// A point of a section.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct SectionPoint {
     /// Distance along the section, mm.
     pub s: f64,
@@ -71,7 +72,7 @@ pub struct SectionPoint {
 }
 
 /// A line fitted to a piece of a section: z = height + slope (s - middle).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct Fit {
     /// Start and end along the section, mm.
     pub piece: [f64; 2],
@@ -90,7 +91,7 @@ pub struct Fit {
 }
 
 /// Result of a section.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct Section {
     /// Its length, mm.
     pub length_mm: f64,
@@ -105,7 +106,7 @@ pub struct Section {
 }
 
 /// A value and its uncertainty.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct Distance {
     /// mm, or degrees for an angle.
     pub value: f64,
@@ -114,7 +115,7 @@ pub struct Distance {
 }
 
 /// A measurement on the map.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(tag = "measure", rename_all = "snake_case")]
 pub enum Measure {
     /// Distance between two points.
@@ -124,7 +125,7 @@ pub enum Measure {
 }
 
 /// Two points.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PointsAsk {
     /// First point, mm in the grid.
@@ -134,7 +135,7 @@ pub struct PointsAsk {
 }
 
 /// A point and a plane.
-#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlaneAsk {
     /// The point, mm in the grid.
@@ -144,7 +145,7 @@ pub struct PlaneAsk {
 }
 
 /// Result of a measurement.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct MeasureAnswer {
     /// The distance, mm; positive for a point above its plane.
     pub distance: Distance,

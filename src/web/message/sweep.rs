@@ -5,11 +5,12 @@
 
 use crate::robot::Convention;
 use crate::station::job::{Pace as Paced, Preview};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
 
 /// The sweep to plan; omitted values are the station's.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, TS)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SweepAsk {
     /// Name of the recipe.
@@ -41,7 +42,7 @@ pub struct SweepAsk {
 }
 
 /// The sweep that a job would make.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct SweepPlan {
     /// Name of the recipe.
     pub recipe: String,
@@ -88,7 +89,7 @@ pub struct SweepPlan {
 }
 
 /// Matching values of speed, step and frame rate.
-#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS, JsonSchema)]
 pub struct Pace {
     /// mm/s.
     pub speed_mm_s: f64,
