@@ -1,6 +1,6 @@
 //! Makes grey images with the sensor's depth from picture files, grey or colour.
 
-use super::samples::{Kind, Samples, Values, Wanted, read_samples};
+use super::samples::{Kind, Samples, Says, Values, Wanted, read_samples};
 use super::size::MOST_PIXELS;
 use super::{Image, Mask, Pixels};
 use crate::fault::{Fault, Result};
@@ -47,11 +47,13 @@ pub struct Depth {
     pub declared: &'static str,
     /// What to do about a picture of another depth.
     pub correct: &'static str,
+    /// The largest level of this depth is saturation: a picture that states a smaller sensor is refused.
+    pub saturates: bool,
 }
 
 impl From<u8> for Depth {
     fn from(bits: u8) -> Depth {
-        Depth { bits, declared: "the caller wants", correct: "give pictures of that depth" }
+        Depth { bits, declared: "the caller wants", correct: "give pictures of that depth", saturates: false }
     }
 }
 
@@ -145,6 +147,7 @@ fn image(samples: Samples, channel: Channel, depth: Depth) -> Result<Image> {
             .cause("the depth that is stated is another camera's or export's than the picture's")
             .next(depth.correct));
     }
+    saturation(&says, depth)?;
     let most = (1u32 << stored) - 1;
     if says.white_is_zero && stored == 16 && depth.bits < 16 {
         return Err(Fault::input(format!(
@@ -173,6 +176,20 @@ fn image(samples: Samples, channel: Channel, depth: Depth) -> Result<Image> {
         }
         Values::F32(_) | Values::F64(_) => unreachable!("other kinds were refused"),
     })
+}
+
+/// Refuses a picture that states a sensor of fewer bits: its saturated pixels would count as measured.
+fn saturation(says: &Says, depth: Depth) -> Result<()> {
+    let full = (1u32 << depth.bits) - 1;
+    // Other largest levels than those of a sensor are of writers that state the largest level of the picture itself.
+    let sensor = |most: &u32| depth.saturates && *most < full && *most != 255 && (most + 1).is_power_of_two();
+    let Some(most) = says.most.filter(sensor) else { return Ok(()) };
+    Err(Fault::input(format!(
+        "states {most} as its largest level (MAXVAL), {} {} bits, whose largest level is {full}",
+        depth.declared, depth.bits
+    ))
+    .cause("the depth that is stated is another sensor's: saturated pixels would not be known as such")
+    .next(depth.correct))
 }
 
 fn within_depth(image: Image, depth: Depth) -> Result<Image> {
@@ -236,5 +253,25 @@ mod tests {
         assert!(load_sized(&path, Channel::Luma, 12, [2, 3]).unwrap_err().what.contains("is 3x2"));
         std::fs::write(&path, &std::fs::read(&path).unwrap()[..40]).unwrap();
         assert!(load(12).is_err());
+    }
+
+    #[test]
+    fn a_pgm_of_a_smaller_sensor_is_refused_where_saturation_counts() {
+        let decoded = |file: &[u8], bits: u8, saturates: bool| {
+            decode(file, Channel::Luma, Depth { saturates, ..Depth::from(bits) })
+        };
+        let ten = b"P5 2 1 1023 \x03\xff\0\x02";
+        let fault = decoded(ten, 12, true).unwrap_err();
+        assert!(fault.what.contains("states 1023") && fault.what.contains("4095"), "{fault}");
+        assert!(decoded(b"P5 2 1 127 \x7f\x02", 8, true).is_err());
+        for (file, bits, saturates) in [
+            (&ten[..], 10, true),
+            (ten, 12, false),
+            (b"P5 2 1 200 \xc8\x02", 8, true),
+            (b"P5 2 1 65535 \x03\xff\0\x02", 12, true),
+            (b"P5 2 1 4095 \x03\xff\0\x02", 10, true),
+        ] {
+            assert!(decoded(file, bits, saturates).is_ok(), "{bits}");
+        }
     }
 }

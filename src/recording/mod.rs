@@ -150,6 +150,7 @@ impl Recording {
             bits: spec.bits,
             declared: "the recording declares",
             correct: "correct image.bits in meta.json, or take the odd pictures out",
+            saturates: true,
         };
         let image = crate::raster::load_sized(path, self.channel, depth, [spec.width, spec.height])?;
         Ok(spec.response.linear(image))

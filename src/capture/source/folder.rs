@@ -120,6 +120,7 @@ impl FolderCamera {
             bits: self.bits,
             declared: "the camera's name says",
             correct: "state the sensor's depth: folder:PATH?bits=12",
+            saturates: true,
         };
         match load(&path, Channel::default(), depth) {
             Ok(image) if self.next == 0 || Format::of(&image) == self.format => {

@@ -205,6 +205,7 @@ fn depth(bits: u8) -> Depth {
         bits,
         declared: "--bits says",
         correct: "give --bits the depth of the sensor: 8, or 9 to 16 for files of 16 bits",
+        saturates: false,
     }
 }
 

@@ -48,36 +48,71 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     let deep = most > 255;
     let pixels = u64::from(width) * u64::from(height);
     let values = if bytes.starts_with(b"P2") {
-        let Some(levels) = words(&bytes[start..], pixels, most) else {
+        let Some((levels, rest)) = words(&bytes[start..], pixels, most) else {
             return broken(format!("is not a readable picture: its text holds no {pixels} levels up to {most}"));
         };
+        alone(rest.as_bytes())?;
         if deep { Values::U16(levels) } else { Values::U8(levels.into_iter().map(|v| v as u8).collect()) }
     } else {
         let (have, need) = ((bytes.len() - start) as u64, pixels * if deep { 2 } else { 1 });
         if have < need {
             return broken(format!("is not a readable picture: {have} bytes of pixels, {width}x{height} need {need}"));
         }
-        let body = &bytes[start..start + need as usize];
+        let (body, rest) = bytes[start..].split_at(need as usize);
+        alone(rest)?;
+        within(body, most)?;
         match deep {
             false => Values::U8(body.to_vec()),
             true => Values::U16(body.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect()),
         }
     };
     let kind = Kind::Unsigned(if deep { 16 } else { 8 });
-    Ok(Samples { width, height, channels: 1, kind, values, hidden: None, veiled: 0, says: Says::default() })
+    let says = Says { most: Some(most), ..Says::default() };
+    Ok(Samples { width, height, channels: 1, kind, values, hidden: None, veiled: 0, says })
 }
 
-/// The levels of a PGM written as text (P2).
-fn words(text: &[u8], pixels: u64, most: u32) -> Option<Vec<u16>> {
+/// Refuses levels above the largest one that the header states.
+fn within(body: &[u8], most: u32) -> Result<()> {
+    let levels = |of: fn([u8; 2]) -> u16| body.chunks_exact(2).map(move |b| u32::from(of([b[0], b[1]])));
+    let deep = most > 255;
+    let largest = match deep {
+        false => body.iter().map(|b| u32::from(*b)).max(),
+        true => levels(u16::from_be_bytes).max(),
+    };
+    let Some(largest) = largest.filter(|largest| *largest > most) else { return Ok(()) };
+    let swapped = deep && levels(u16::from_le_bytes).all(|v| v <= most);
+    Err(Fault::input(format!("holds the level {largest}, above the largest level {most} that it states (MAXVAL)"))
+        .cause(match swapped {
+            true => "its levels are stored with the low byte first; a PGM has the high byte first",
+            false => "the program that wrote it stated another depth than that of the levels",
+        })
+        .next("write the file again with the largest level and the byte order of PGM, or as a PNG of 16 bits"))
+}
+
+/// Refuses further pictures behind the first.
+fn alone(rest: &[u8]) -> Result<()> {
+    let rest = rest.trim_ascii_start();
+    let another = matches!(rest, [b'P', b'1'..=b'7', next, ..] if next.is_ascii_whitespace() || *next == b'#');
+    if !another {
+        return Ok(());
+    }
+    Err(Fault::input("holds several pictures, one behind the other")
+        .cause("a film; one picture is needed, and it is not stated which")
+        .next("save that picture as a separate file"))
+}
+
+/// The levels of a PGM written as text (P2), and the word after them.
+fn words(text: &[u8], pixels: u64, most: u32) -> Option<(Vec<u16>, String)> {
     // A level takes at least a digit and a blank.
     if pixels > text.len() as u64 {
         return None;
     }
     let text = std::str::from_utf8(text).ok()?;
-    let words = text.lines().map(|l| l.split('#').next().unwrap_or("")).flat_map(str::split_ascii_whitespace);
+    let mut words = text.lines().map(|l| l.split('#').next().unwrap_or("")).flat_map(str::split_ascii_whitespace);
     let level = |w: &str| w.parse::<u16>().ok().filter(|v| u32::from(*v) <= most);
-    let levels = words.take(pixels as usize).map(level).collect::<Option<Vec<u16>>>()?;
-    (levels.len() as u64 == pixels).then_some(levels)
+    let levels = words.by_ref().take(pixels as usize).map(level).collect::<Option<Vec<u16>>>()?;
+    // A blank ends the word, as it ends the mark of a further picture.
+    (levels.len() as u64 == pixels).then(|| (levels, words.next().map(|w| format!("{w} ")).unwrap_or_default()))
 }
 
 #[cfg(test)]
@@ -104,8 +139,17 @@ mod tests {
             b"P2 2 1 15 3 16",
             b"P2 2 1 15 3",
             b"P2 2 1 15 3 x",
+            b"P5 2 1 15 \x10\x0f",
         ] {
             assert!(decode(wrong).is_err());
+        }
+        let swapped = decode(b"P5 2 1 4095 \xff\x0f\x02\0").unwrap_err();
+        assert!(swapped.what.contains("MAXVAL") && swapped.cause.contains("low byte first"), "{swapped}");
+        for film in [&b"P5 2 1 15 \x01\x0fP5 2 1 15 \x01\x0f"[..], b"P2 2 1 15 3 4\nP2\n2 1 15 5 6\n"] {
+            assert!(decode(film).unwrap_err().what.contains("several pictures"));
+        }
+        for end in [&b"P5 2 1 15 \x01\x0f\n"[..], b"P5 2 1 15 \x01\x0f and more", b"P2 2 1 15 3 4\n# the end\n"] {
+            assert!(decode(end).is_ok());
         }
     }
 }

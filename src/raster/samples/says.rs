@@ -11,6 +11,8 @@ pub struct Says {
     pub scale: Option<[f64; 2]>,
     /// Distance of columns and rows, in a unit that the file does not name (ModelPixelScale).
     pub spacing: Option<[f64; 2]>,
+    /// The largest level that the header of a PGM states (MAXVAL).
+    pub most: Option<u32>,
     /// The smallest sample is the brightest one.
     pub white_is_zero: bool,
     /// Compression changed the samples (JPEG).

@@ -197,8 +197,12 @@ pub fn shift_scan(
     let all = names.len() + empty.len();
     let mut done = 0;
     let mut rows = |path: &PathBuf| {
-        let depth =
-            Depth { bits: 8, declared: "a shift scan takes", correct: "export the pictures with 8 bits a pixel" };
+        let depth = Depth {
+            bits: 8,
+            declared: "a shift scan takes",
+            correct: "export the pictures with 8 bits a pixel",
+            saturates: true,
+        };
         let found = stripe_by_row(&crate::raster::load(path, rig.channel, depth)?);
         done += 1;
         progress(done, all);
