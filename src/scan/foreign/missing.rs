@@ -93,11 +93,67 @@ pub(super) fn suspects(
         return;
     }
     let all = heights.clone().count();
-    for (height, n) in repeated(heights) {
+    let mut named = vec![];
+    for (height, n) in repeated(heights.clone()) {
+        named.push(height);
         notes.push(format!(
             "{n} of {all} {what} have exactly the height {0}: if that means 'not measured', give --missing {0}; they \
              count as measured",
             Plain(height)
         ));
+    }
+    if let Some((height, n, [low, high])) = lone(heights).filter(|l| !named.contains(&l.0)) {
+        notes.push(format!(
+            "{n} of {all} {what} have the height {0}, far from all others ({1} to {2}): if that means 'not measured', \
+             give --missing {0}; they count as measured",
+            Plain(height),
+            Plain(low),
+            Plain(high)
+        ));
+    }
+}
+
+/// How many times as far away as the others reach a height must lie to be suspect: a single one, several equal ones.
+const APART: [f64; 2] = [3.0, 0.5];
+/// So many equal heights are a surface.
+const SURFACE: usize = 8;
+
+/// The lowest or the highest height, if it is far from all others: its number, and the range of the others.
+fn lone(heights: impl Iterator<Item = f64> + Clone) -> Option<(f64, usize, [f64; 2])> {
+    let range = |skip: [f64; 2]| {
+        let rest = heights.clone().filter(|v| v.is_finite() && !skip.contains(v));
+        rest.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+    };
+    let ends = range([f64::NAN; 2]);
+    let [low, high] = range(ends);
+    let count = |end: f64| heights.clone().filter(|v| *v == end).count();
+    let far = |end: f64, gap: f64| {
+        let n = count(end);
+        let apart = if n == 1 { APART[0] } else { APART[1] };
+        (high > low && n <= SURFACE && gap > apart * (high - low)).then_some((end, n, [low, high]))
+    };
+    far(ends[0], low - ends[0]).or_else(|| far(ends[1], ends[1] - high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_single_height_far_from_all_others_is_named() {
+        let with = |ends: &[f64]| {
+            let all: Vec<f64> =
+                (0..1200).map(|i| 5.0 + f64::from(i * 7919 % 1201) * 1e-3).chain(ends.iter().copied()).collect();
+            lone(all.iter().copied()).map(|l| (l.0, l.1))
+        };
+        assert_eq!(with(&[-9999.0]), Some((-9999.0, 1)));
+        assert_eq!(with(&[0.0; 6]), Some((0.0, 6)));
+        assert_eq!(with(&[999.999, 999.999]), Some((999.999, 2)));
+        assert_eq!(with(&[-9999.0, 7.0]), Some((-9999.0, 1)));
+        // A burr, a step, a surface of its own.
+        for measured in [&[7.0][..], &[], &[3.0; 9], &[6.3, 6.3]] {
+            assert_eq!(with(measured), None, "{measured:?}");
+        }
+        assert_eq!(lone([1.0, 1.0, 9.0].into_iter()), None);
     }
 }
