@@ -217,7 +217,7 @@ fn white_is_zero_turns_light_round_and_no_heights() {
     let raw = read_foreign(&tiff(&[Page::floats([3, 1], &[1.0; 3])], false, false)).unwrap();
     let stated = Stated { unit_mm: Some(1.0), spacing_mm: Some([1.0; 2]), sigma_mm: Some(0.1), ..Stated::default() };
     let made = lines(&raw, Some(&read_foreign(&eight).unwrap()), &stated).unwrap();
-    assert_eq!(made.points.iter().map(|p| p.intensity).collect::<Vec<_>>(), [255.0, 245.0, 1.0]);
+    assert_eq!(made.points.iter().map(|p| p.intensity).collect::<Vec<_>>(), [255.0, 245.0, 0.0]);
     let light = read_foreign(&white(Page::floats([3, 1], &[1.0; 3]))).unwrap();
     refused(lines(&raw, Some(&light), &stated), "0 is white");
 }

@@ -125,7 +125,7 @@ fn picture(
     })?;
     said(says, [dx, dy], stated, notes);
     let missing = missing::of_picture(stated, says, kind, levels, notes)?;
-    let light = light.map(|light| brightness(light, [width, height])).transpose()?;
+    let light = light.map(|light| brightness(light, [width, height], notes)).transpose()?;
     let sign = if stated.rows_up { 1.0 } else { -1.0 };
     notes.push(format!(
         "frame 'map': origin at the first pixel, x along the columns, y {} the rows, z up",
@@ -168,8 +168,8 @@ fn said(says: &Says, [dx, dy]: [f64; 2], stated: &Stated, notes: &mut Vec<String
     }
 }
 
-/// The levels of an intensity picture: larger is brighter, not finite where the intensity is unknown.
-fn brightness(light: &Raw, [width, height]: [usize; 2]) -> Result<Vec<f32>> {
+/// The levels of an intensity picture: larger is brighter, 0 where the intensity is unknown.
+fn brightness(light: &Raw, [width, height]: [usize; 2], notes: &mut Vec<String>) -> Result<Vec<f32>> {
     let (levels, kind, says) = match light {
         Raw::Picture { width: w, height: h, levels, kind, says } if (*w, *h) == (width, height) => (levels, kind, says),
         _ => {
@@ -191,7 +191,17 @@ fn brightness(light: &Raw, [width, height]: [usize; 2]) -> Result<Vec<f32>> {
     };
     let known = |v: f64| !says.missing.is_some_and(|level| kind.same(v, level));
     let level = |v: &f64| if known(*v) { most.map_or(*v, |most| most - *v) as f32 } else { f32::NAN };
-    Ok(levels.iter().map(level).collect())
+    let mut levels: Vec<f32> = levels.iter().map(level).collect();
+    let unknown = levels.iter().filter(|v| !v.is_finite()).count();
+    if unknown > 0 {
+        notes.push(format!("{unknown} pixels of the picture of the light hold no level: theirs is taken as 0"));
+        levels.iter_mut().filter(|v| !v.is_finite()).for_each(|v| *v = 0.0);
+    }
+    let below = levels.iter().filter(|v| **v < 0.0).count();
+    if below > 0 {
+        notes.push(format!("{below} pixels of the picture of the light are below 0: they count as black in the map"));
+    }
+    Ok(levels)
 }
 
 fn organised(
@@ -273,7 +283,7 @@ fn finish(mut placed: Vec<Placed>, stated: &Stated, mut notes: Vec<String>) -> R
     let point = |&(line, place, p, light): &Placed| CloudPoint {
         position: glam::DVec3::from_array(p).as_vec3(),
         sigma_mm: sigma_mm as f32,
-        intensity: if light.is_finite() && light > 0.0 { light } else { 1.0 },
+        intensity: if light.is_finite() { light } else { 0.0 },
         quality: 1.0,
         shot: line,
         u: place as f32,
