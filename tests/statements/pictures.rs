@@ -450,3 +450,7 @@ fn levels_are_not_stretched_and_what_is_said_of_them_is_told() {
     refused(read_foreign(&film), "animation");
     refused(decode(&film, Channel::Luma, 8), "animation");
 }
+    // Colours under hidden pixels are no colours.
+    let (_, seen) = levels(&plain_png(Rgba, Eight, 2, &[1, 2, 3, 0, 6, 6, 6, 255], &[]));
+    assert!(seen[0].is_nan() && seen[1] == 6.0, "{seen:?}");
+    refused(read_foreign(&plain_png(Rgba, Eight, 2, &[1, 2, 3, 255, 6, 6, 6, 255], &[])), "colour");

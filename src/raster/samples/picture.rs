@@ -74,10 +74,12 @@ impl Samples {
         self.width as usize * self.height as usize
     }
 
-    /// Whether no pixel is coloured: red, green and blue are the same number everywhere.
+    /// Whether no pixel is coloured: red, green and blue are the same number wherever the file hides nothing.
     pub fn grey(&self) -> bool {
-        self.channels == 1
-            || (0..self.pixel_count()).all(|i| (1..self.channels).all(|c| self.get(i, c) == self.get(i, 0)))
+        let width = self.width as usize;
+        let hidden = |i: usize| self.hidden.as_ref().is_some_and(|h| h.get((i % width) as u32, (i / width) as u32));
+        let plain = |i: usize| (1..self.channels).all(|c| self.get(i, c) == self.get(i, 0));
+        self.channels == 1 || (0..self.pixel_count()).all(|i| plain(i) || hidden(i))
     }
 
     /// Separates the channel behind the colours, alpha, from them. Alpha 0 hides a pixel, `opaque` does not.
