@@ -25,7 +25,7 @@ pub use light::Light;
 pub use mask::Mask;
 pub use read_out::{Otherwise, ReadOut};
 pub use response::Response;
-pub use samples::{Kind, Samples, Says, Wanted, read_samples};
+pub use samples::{Kind, Samples, Says, Wanted, read_samples, unit_mm};
 pub use size::{MOST_PIXELS, MOST_SIDE};
 pub use text::text_width;
 

@@ -124,6 +124,176 @@ fn all_eight_orientations_are_obeyed_in_every_format() {
     refused(read_foreign(&tiff(&[Page::floats([1, 1], &[1.0]).short(274, 9)], false, false)), "tag 274");
 }
 
+const XMP_4: &[u8] = br#"<x:xmpmeta><rdf:Description tiff:Make="a" tiff:Orientation="4"/></x:xmpmeta>"#;
+
+#[test]
+fn an_orientation_outside_exif_is_obeyed_too() {
+    let png = || written([3, 2], &STORED, image::ExtendedColorType::L8, image::ImageFormat::Png);
+    let app1 = [b"Exif\0\0".to_vec(), exif(4)].concat();
+    let digits: String = app1.iter().map(|b| format!("{b:02x}")).collect();
+    let raw = [b"Raw profile type exif\0", format!("\nexif\n{:8}\n{digits}\n", app1.len()).as_bytes()].concat();
+    let xmp = [b"XML:com.adobe.xmp\0\0\0\0\0", XMP_4].concat();
+    let page = Page::grey([3, 2], 8, 1, STORED.to_vec());
+    for (file, by) in [
+        (with_chunk(png(), b"iTXt", &xmp, false), "tiff:Orientation"),
+        (with_chunk(png(), b"iTXt", &xmp, true), "tiff:Orientation"),
+        (with_chunk(png(), b"tEXt", &raw, false), "Raw profile"),
+        (tiff(&[page.with(700, 1, XMP_4.to_vec())], false, false), "tiff:Orientation"),
+    ] {
+        assert_eq!(levels(&file), (3, SEEN[3].map(f64::from).to_vec()), "{by}");
+        assert_eq!(grey(&file), (3, SEEN[3].to_vec()), "{by}");
+        let stated = Stated { missing: Some(None), ..Stated::default() };
+        assert!(heights(&file, &stated).unwrap().1.contains(by), "{by}");
+    }
+    let blocks: Vec<u8> = (0..16 * 24).map(|i| STORED[i / 24 / 8 * 3 + i % 24 / 8]).collect();
+    let mut jpeg = written([24, 16], &blocks, image::ExtendedColorType::L8, image::ImageFormat::Jpeg);
+    let app1 = [b"http://ns.adobe.com/xap/1.0/\0", XMP_4].concat();
+    jpeg.splice(2..2, [&[0xff, 0xe1], &(app1.len() as u16 + 2).to_be_bytes()[..], &app1].concat());
+    let pixels = grey(&jpeg).1;
+    assert!((i32::from(pixels[4 * 24 + 4]) - 40).abs() < 4 && (i32::from(pixels[12 * 24 + 4]) - 10).abs() < 4);
+    // Exif has precedence, and strange numbers are refused.
+    let both = with_chunk(with_chunk(png(), b"iTXt", &xmp, false), b"eXIf", &exif(2), false);
+    assert_eq!(grey(&both), (3, SEEN[1].to_vec()));
+    let said = heights(&both, &Stated { missing: Some(None), ..Stated::default() }).unwrap().1;
+    assert!(said.contains("two orientations"), "{said}");
+    let wrong = b"XML:com.adobe.xmp\0\0\0\0\0<r tiff:Orientation='9'/>";
+    refused(read_foreign(&with_chunk(png(), b"iTXt", wrong, false)), "tiff:Orientation");
+}
+
+/// The matrix of ModelTransformation from column and row to x and y.
+fn land([a, b, d, e]: [f64; 4], k: f64) -> Vec<f64> {
+    [[a, b, 0.0, 0.0], [d, e, 0.0, 0.0], [0.0, 0.0, k, 0.0], [0.0, 0.0, 0.0, 1.0]].concat()
+}
+
+#[test]
+fn a_map_of_the_land_is_not_mirrored() {
+    let page = || Page::floats([3, 2], &STORED.map(f32::from));
+    for (matrix, orientation) in
+        [([1.0, 0.0, 0.0, -1.0], 1), ([1.0, 0.0, 0.0, 1.0], 4), ([-1.0, 0.0, 0.0, -1.0], 2), ([-1.0, 0.0, 0.0, 1.0], 1)]
+    {
+        let file = tiff(&[page().doubles(34_264, &land(matrix, 0.0))], false, true);
+        assert_eq!(levels(&file).1, SEEN[orientation - 1].map(f64::from).to_vec(), "{matrix:?}");
+        let said = heights(&file, &Stated::default()).unwrap().1;
+        assert_eq!(said.contains("tag 34264"), orientation > 1, "{said}");
+    }
+    let upwards = |page: Page| page.doubles(34_264, &land([0.1, 0.0, 0.0, 0.1], 0.001));
+    let twice = tiff(&[upwards(page().short(274, 4))], false, false);
+    assert_eq!(levels(&twice).1, SEEN[3].map(f64::from).to_vec());
+    let said = heights(&twice, &Stated::default()).unwrap().1;
+    assert!(said.contains("0.1 x 0.1 apart") && said.contains("a height is 0.001 of a sample"), "{said}");
+    refused(read_foreign(&tiff(&[upwards(page().short(274, 3))], false, false)), "tag 34264");
+    // The mask of a picture is stored as the picture is.
+    let mask = Page::grey([3, 2], 1, 1, vec![0b0110_0000, 0b1110_0000]).short(254, 4).short(262, 4);
+    for above in [upwards(page()), page().short(274, 4)] {
+        let (_, masked) = levels(&tiff(&[above, mask.clone()], false, false));
+        assert!(masked[3].is_nan() && masked.iter().filter(|v| v.is_nan()).count() == 1, "{masked:?}");
+    }
+}
+
+/// A file whose second page lies below the first one, which has tag 330.
+fn below(pages: [Page; 2]) -> Vec<u8> {
+    let [above, sub] = pages;
+    let mut file = tiff(&[above.with(330, 4, vec![0; 4]), sub], false, false);
+    let number = |file: &[u8], at: usize| u32::from_le_bytes(file[at..at + 4].try_into().unwrap()) as usize;
+    let first = number(&file, 4);
+    let link = first + 2 + 12 * usize::from(u16::from_le_bytes([file[first], file[first + 1]]));
+    let entry = (first + 2..link).step_by(12).find(|at| file[*at..*at + 2] == [0x4a, 1]).unwrap();
+    file.copy_within(link..link + 4, entry + 8);
+    file[link..link + 4].fill(0);
+    file
+}
+
+#[test]
+fn pages_below_a_page_are_pages() {
+    let map = |v: f32| Page::floats([2, 2], &[v, v + 1.0, v + 2.0, v + 3.0]);
+    let small = |v: f32| Page::floats([1, 1], &[v]);
+    // A reduced copy before the map, one below it, and one that is not named as such.
+    for file in [below([small(9.0).short(254, 1), map(1.0)]), below([map(1.0), small(9.0).short(254, 1)])] {
+        assert_eq!(levels(&file).1, [1.0, 2.0, 3.0, 4.0]);
+        assert!(heights(&file, &Stated::default()).unwrap().1.contains("reduced copies"));
+    }
+    assert_eq!(levels(&below([map(1.0), small(9.0)])).1, [1.0, 2.0, 3.0, 4.0]);
+    let two = below([map(1.0), map(5.0)]);
+    refused(read_foreign(&two), "tag 330");
+    let Raw::Picture { levels: second, .. } = read_foreign_page(&two, Some(2)).unwrap() else { panic!() };
+    assert_eq!(second, [5.0, 6.0, 7.0, 8.0]);
+    let shades = |v: u8| Page::grey([1, 1], 8, 1, vec![v]).short(262, 0);
+    assert_eq!(grey(&below([shades(9).short(254, 1), shades(7)])).1, [248]);
+    // A mask below its map, and the masks of reduced copies.
+    let mask = |kind: u16| Page::grey([2, 2], 1, 1, vec![0x40, 0xc0]).short(254, kind).short(262, 4);
+    let seen = levels(&below([map(1.0), mask(4)])).1;
+    assert!(seen[0].is_nan() && seen[1..] == [2.0, 3.0, 4.0], "{seen:?}");
+    let reduced = Page::grey([1, 1], 1, 1, vec![0]).short(254, 5).short(262, 4);
+    let all = [map(1.0), small(9.0).short(254, 1), mask(4), reduced.clone()];
+    assert_eq!(levels(&tiff(&all, false, false)).1[1..], [2.0, 3.0, 4.0]);
+    refused(read_foreign(&tiff(&[map(1.0), reduced], false, false)), "masks");
+    refused(read_foreign(&tiff(&[map(1.0), mask(4), mask(4)], false, false)), "2 masks");
+}
+
+#[test]
+fn a_stack_in_one_page_is_refused() {
+    let page = || Page::floats([2, 1], &[1.0, 2.0]).text(270, "ImageJ=1.53\nimages=3\nslices=3\n");
+    let stack = tiff(&[page()], false, false);
+    refused(read_foreign(&stack), "3 pictures");
+    assert!(read_foreign_page(&stack, Some(1)).is_ok());
+    refused(read_foreign_page(&stack, Some(2)), "page 2");
+    refused(read_foreign(b"P5 2 1 255 abP5 2 1 255 cd"), "several pictures");
+    refused(decode(b"P5 2 1 255 ab\nP5 2 1 255 cd", Channel::Luma, 8), "several pictures");
+    refused(read_foreign(b"P5 2 1 4095 \xff\x0f\x02\0"), "MAXVAL");
+}
+
+#[test]
+fn shades_of_a_palette_are_named() {
+    let stated = Stated { missing: Some(None), ..Stated::default() };
+    let map: Vec<u16> = [100u16, 25_700].iter().chain(&[0; 254]).copied().collect::<Vec<_>>().repeat(3);
+    let pal = tiff(&[Page::grey([2, 1], 8, 1, vec![0, 1]).short(262, 3).shorts(320, &map)], false, false);
+    let same: Vec<u16> = (0..256u16).map(|i| 257 * i).collect::<Vec<_>>().repeat(3);
+    let plain = tiff(&[Page::grey([2, 1], 8, 1, vec![7, 9]).short(262, 3).shorts(320, &same)], false, false);
+    // Two pixels of 4 bits, 1 and 2, and 16 greys.
+    let bmp = |step: u8| {
+        let mut out = b"BM".to_vec();
+        for v in [122u32, 0, 118, 40, 2, 1, 1 | 4 << 16, 0, 4, 0, 0, 16, 0] {
+            out.extend(v.to_le_bytes());
+        }
+        (0..16).for_each(|i| out.extend([i * step, i * step, i * step, 0]));
+        out.extend([0x12, 0, 0, 0]);
+        out
+    };
+    for (file, wanted, named) in [
+        (pal, [0.0, 100.0], true),
+        (plain, [7.0, 9.0], false),
+        (indexed(&[3, 3, 3, 4, 4, 4], &[]), [3.0, 4.0], true),
+        (indexed(&[0, 0, 0, 1, 1, 1], &[]), [0.0, 1.0], false),
+        (bmp(17), [17.0, 34.0], true),
+        (bmp(1), [1.0, 2.0], false),
+    ] {
+        assert_eq!(levels(&file).1, wanted);
+        assert_eq!(heights(&file, &stated).unwrap().1.contains("palette"), named, "{wanted:?}");
+    }
+}
+
+#[test]
+fn a_unit_of_the_file_that_differs_is_named() {
+    let page = || Page::floats([2, 1], &[1.0, 2.0]);
+    let gdal = "<GDALMetadata><Item name='UNITTYPE' sample='0' role='unittype'>metre</Item></GDALMetadata>";
+    let ratio = |a: u32, b: u32| [a.to_le_bytes(), b.to_le_bytes()].concat();
+    let resolved = |text: &str| page().text(270, text).with(282, 5, ratio(10, 1)).with(283, 5, ratio(10, 1));
+    let ome = r#"<OME><Pixels PhysicalSizeX="250" PhysicalSizeY="0.25" PhysicalSizeYUnit="mm"/></OME>"#;
+    for (page, wanted) in [
+        (page().text(42_112, gdal), "--unit-mm 1000"),
+        (page().shorts(34_735, &[1, 1, 0, 1, 4099, 0, 1, 9002]), "--unit-mm 304.8"),
+        (page().text(270, "ImageJ=1.53\nvunit=micron\n"), "--unit-mm 0.001"),
+        (resolved("ImageJ=1.53\nunit=mm\n"), "0.1 x 0.1 apart, in mm"),
+        (page().text(270, ome), "0.25 x 0.25 apart, in mm"),
+    ] {
+        let (z, said) = heights(&tiff(&[page], false, false), &Stated::default()).unwrap();
+        assert!(z == [1.0, 2.0] && said.contains(wanted) && said.contains("as stated"), "{said}");
+    }
+    for page in [page().text(270, "ImageJ=1.53\nvunit=mm\n"), resolved("printed at 10 dpi")] {
+        assert!(!heights(&tiff(&[page], false, false), &Stated::default()).unwrap().1.contains("as stated"));
+    }
+}
+
 #[test]
 fn every_kind_of_number_is_read_as_written() {
     let wide = |v: &[i64], bytes: usize| v.iter().flat_map(|v| v.to_le_bytes()[..bytes].to_vec()).collect::<Vec<u8>>();
@@ -271,6 +441,7 @@ fn scales_and_distances_of_the_file_are_honoured_or_said() {
     let stated = Stated { missing: Some(None), ..Stated::default() };
     for (page, wanted, tag) in [
         (page(4).text(42_112, xml), [12.0, 13.0], "tag 42112"),
+        (page(4).text(42_112, &xml.replace('"', "'")), [12.0, 13.0], "tag 42112"),
         (page(32_769).text(270, signed), [1.0, 3.0], "tag 270"),
         (page(4).doubles(33_550, &[0.25, 0.25, 0.0]), [4.0, 6.0], "tag 33550"),
     ] {
@@ -416,6 +587,10 @@ fn transparent_pixels_are_not_measured_and_not_seen() {
         refused(read_foreign(&veiled), "in part");
         refused(decode_in_part(&veiled, Channel::Luma, 8), "in part");
     }
+    // Colours under hidden pixels are no colours.
+    let (_, seen) = levels(&plain_png(Rgba, Eight, 2, &[1, 2, 3, 0, 6, 6, 6, 255], &[]));
+    assert!(seen[0].is_nan() && seen[1] == 6.0, "{seen:?}");
+    refused(read_foreign(&plain_png(Rgba, Eight, 2, &[1, 2, 3, 255, 6, 6, 6, 255], &[])), "colour");
     let opaque = plain_png(Rgba, Eight, 2, &[5, 5, 5, 255, 6, 6, 6, 255], &[]);
     assert_eq!(grey(&opaque), (2, vec![5, 6]));
 }
@@ -450,7 +625,3 @@ fn levels_are_not_stretched_and_what_is_said_of_them_is_told() {
     refused(read_foreign(&film), "animation");
     refused(decode(&film, Channel::Luma, 8), "animation");
 }
-    // Colours under hidden pixels are no colours.
-    let (_, seen) = levels(&plain_png(Rgba, Eight, 2, &[1, 2, 3, 0, 6, 6, 6, 255], &[]));
-    assert!(seen[0].is_nan() && seen[1] == 6.0, "{seen:?}");
-    refused(read_foreign(&plain_png(Rgba, Eight, 2, &[1, 2, 3, 255, 6, 6, 6, 255], &[])), "colour");

@@ -2,7 +2,10 @@
 
 use super::kind::{Kind, Values};
 use super::picture::{DECODING, Samples, Wanted, unreadable};
+use super::png::{exif_orientation, palette_note};
 use super::says::Says;
+use super::turn::Orientation;
+use super::xmp::chosen;
 use crate::fault::{Fault, Result};
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use std::io::Cursor;
@@ -15,8 +18,11 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     reader.no_limits();
     let mut decoder = reader.into_decoder().map_err(|e| strange(&e))?;
     let (width, height) = decoder.dimensions();
-    let orientation = decoder.orientation().map_or(1, |o| u16::from(o.to_exif()));
-    wanted.fits(orientation, [width, height])?;
+    let exif = decoder.exif_metadata().ok().flatten().and_then(|exif| exif_orientation(&exif));
+    let xmp = decoder.xmp_metadata().ok().flatten();
+    let (orientation, note) = chosen(exif.map(Orientation::exif), xmp.as_deref())?;
+    let orientation = orientation.unwrap_or(Orientation::UPRIGHT);
+    wanted.fits(orientation.number, [width, height])?;
     stretched(bytes)?;
     // The picture, and its samples without alpha, are in memory together.
     let _memory = DECODING.hold(3 * decoder.total_bytes());
@@ -24,6 +30,7 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     let says = Says {
         lossy: format == Some(ImageFormat::Jpeg),
         two_levels: bytes.starts_with(b"P1") || bytes.starts_with(b"P4"),
+        notes: note.into_iter().chain(palette_of_bmp(bytes)).collect(),
         ..Says::default()
     };
     let channels = usize::from(picture.color().channel_count());
@@ -42,6 +49,22 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     let opaque = kind.most().unwrap_or(1.0);
     let samples = if channels % 2 == 0 { samples.parted(opaque) } else { samples };
     Ok(samples.upright(orientation))
+}
+
+/// A note on a BMP whose palette replaces the numbers that are stored; a palette that leaves them needs none.
+fn palette_of_bmp(bytes: &[u8]) -> Option<String> {
+    let number = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
+    let header = number(14).filter(|_| bytes.starts_with(b"BM"))?;
+    // The first kind of header (OS/2) has shorter fields, and colours of three bytes.
+    let (depth_at, each) = if header == 12 { (24, 3) } else { (28, 4) };
+    let depth = u32::from(u16::from_le_bytes(bytes.get(depth_at..depth_at + 2)?.try_into().ok()?));
+    let all = 1usize.checked_shl(depth).filter(|_| (1..=8).contains(&depth))?;
+    let named = if header == 12 { 0 } else { number(46)? as usize };
+    let colours = if named == 0 { all } else { named.min(all) };
+    let start = 14 + usize::try_from(header).ok()?;
+    let palette = bytes.get(start..start + colours * each)?;
+    let same = palette.chunks_exact(each).enumerate().all(|(n, c)| c[..3].iter().all(|v| usize::from(*v) == n));
+    (!same).then(|| palette_note("the colour table of the BMP"))
 }
 
 /// The `image` crate stretches a PNM whose largest level is neither 255 nor 65535.

@@ -2,7 +2,7 @@
 
 use super::kind::{Kind, Values};
 use super::says::Says;
-use super::turn;
+use super::turn::{self, Orientation};
 use crate::fault::{Fault, Result};
 use crate::raster::Mask;
 use crate::raster::budget::Budget;
@@ -100,8 +100,8 @@ impl Samples {
         self.hidden = (hidden.count() > 0).then_some(hidden);
     }
 
-    /// Turns stored samples upright and notes it.
-    pub(super) fn upright(mut self, orientation: u16) -> Samples {
+    /// Turns stored samples upright and notes it; `by` names the statement.
+    pub(super) fn upright(mut self, Orientation { number: orientation, by }: Orientation) -> Samples {
         if orientation <= 1 {
             return self;
         }
@@ -116,9 +116,7 @@ impl Samples {
             self.hidden = Some(Mask::from_fn(self.width, self.height, |_, _| from.next().is_some_and(at)));
         }
         self.says.orientation = Some(orientation);
-        self.says
-            .notes
-            .push(format!("the picture was turned upright as its orientation says (tag 274 = {orientation})"));
+        self.says.notes.push(format!("the picture was turned upright as its orientation says ({by} = {orientation})"));
         self
     }
 }

@@ -3,8 +3,9 @@
 use super::kind::{Kind, Values};
 use super::picture::{DECODING, Samples, Wanted, unreadable};
 use super::says::Says;
+use super::turn::Orientation;
+use super::xmp::{chosen, in_raw_profile};
 use crate::fault::{Fault, Result};
-use image::metadata::Orientation;
 use png::{BitDepth, ColorType, Info};
 use std::io::Cursor;
 
@@ -15,7 +16,6 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     // The size is checked here, against the limits of this program.
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: usize::MAX });
     decoder.set_transformations(png::Transformations::IDENTITY);
-    decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
     let [width, height] = <[u32; 2]>::from(decoder.read_header_info().map_err(strange)?.size());
     // An orientation later in the file may swap columns and rows; any other size is refused before anything is decoded.
@@ -38,10 +38,12 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     // An eXIf chunk may follow the pixels; a file that ends before its end mark is complete enough.
     let _ = reader.finish();
     let info = reader.info();
-    let orientation = orientation(info);
-    wanted.fits(orientation, [width, height])?;
+    let (orientation, note) = orientation(info)?;
+    wanted.fits(orientation.number, [width, height])?;
     single(info)?;
-    Ok(samples(info, values)?.upright(orientation))
+    let mut samples = samples(info, values)?.upright(orientation);
+    samples.says.notes.extend(note);
+    Ok(samples)
 }
 
 /// Refuses animations: their other pictures would be ignored.
@@ -56,10 +58,46 @@ fn single(info: &Info) -> Result<()> {
     }
 }
 
-fn orientation(info: &Info) -> u16 {
-    let exif = info.exif_metadata.as_deref().unwrap_or_default();
-    let exif = exif.strip_prefix(b"Exif\0\0").unwrap_or(exif);
-    Orientation::from_exif_chunk(exif).map_or(1, |o| u16::from(o.to_exif()))
+/// The orientation of Exif, else of ImageMagick's copy of it, else of XMP; and a note if XMP contradicts.
+fn orientation(info: &Info) -> Result<(Orientation, Option<String>)> {
+    let number = |exif: &[u8]| {
+        let exif = exif.strip_prefix(b"Exif\0\0").unwrap_or(exif);
+        exif_orientation(exif)
+    };
+    let exif = info.exif_metadata.as_deref().and_then(number).map(Orientation::exif);
+    let raw = || {
+        let profile = ["Raw profile type exif", "Raw profile type APP1"].iter().find_map(|name| text_of(info, name));
+        let number = number(&in_raw_profile(&profile?)?)?;
+        Some(Orientation { number, by: "Raw profile type exif, tag 274" })
+    };
+    let profile = || text_of(info, "Raw profile type xmp").and_then(|text| in_raw_profile(&text));
+    let xmp = text_of(info, "XML:com.adobe.xmp").map(String::into_bytes).or_else(profile);
+    let (orientation, note) = chosen(exif.or_else(raw), xmp.as_deref())?;
+    Ok((orientation.unwrap_or(Orientation::UPRIGHT), note))
+}
+
+/// The number of an orientation in Exif, which is a TIFF of one directory.
+pub(super) fn exif_orientation(exif: &[u8]) -> Option<u16> {
+    image::metadata::Orientation::from_exif_chunk(exif).map(|o| u16::from(o.to_exif()))
+}
+
+/// Largest text of a chunk that is unpacked, bytes.
+const MOST_TEXT: usize = 1 << 20;
+
+/// The text of the chunk with this keyword, in any of the three kinds of text chunks.
+fn text_of(info: &Info, keyword: &str) -> Option<String> {
+    let plain = info.uncompressed_latin1_text.iter().find(|t| t.keyword == keyword).map(|t| t.text.clone());
+    let packed = || {
+        let mut text = info.compressed_latin1_text.iter().find(|t| t.keyword == keyword)?.clone();
+        text.decompress_text_with_limit(MOST_TEXT).ok()?;
+        text.get_text().ok()
+    };
+    let wide = || {
+        let mut text = info.utf8_text.iter().find(|t| t.keyword == keyword)?.clone();
+        text.decompress_text_with_limit(MOST_TEXT).ok()?;
+        text.get_text().ok()
+    };
+    plain.or_else(packed).or_else(wide)
 }
 
 fn samples(info: &Info, stored: Values) -> Result<Samples> {
@@ -101,7 +139,7 @@ fn samples(info: &Info, stored: Values) -> Result<Samples> {
 /// Replaces a palette's numbers by the colours; a palette of greys gives a grey picture.
 fn coloured(mut samples: Samples, info: &Info) -> Result<Samples> {
     let palette = info.palette.as_deref().unwrap_or_default();
-    let Values::U8(numbers) = &samples.values else { return Ok(samples) };
+    let Values::U8(numbers) = samples.values.clone() else { return Ok(samples) };
     let most = usize::from(numbers.iter().copied().max().unwrap_or(0));
     if 3 * most + 2 >= palette.len() {
         return Err(Fault::input(format!("names colour {most} of a palette of {}", palette.len() / 3))
@@ -113,12 +151,20 @@ fn coloured(mut samples: Samples, info: &Info) -> Result<Samples> {
     let alpha = |n: u8| info.trns.as_ref().and_then(|t| t.get(usize::from(n))).map_or(1.0, |a| f64::from(*a) / 255.0);
     let there: Vec<f64> = numbers.iter().map(|n| alpha(*n)).collect();
     let channels = if grey { 1 } else { 3 };
+    if numbers.iter().any(|n| colour(n) != [*n; 3]) {
+        samples.says.notes.push(palette_note("PLTE"));
+    }
     let values = Values::U8(numbers.iter().flat_map(|n| colour(n).into_iter().take(channels)).collect());
     (samples.values, samples.channels, samples.kind) = (values, channels, Kind::Unsigned(8));
     if info.trns.is_some() {
         samples.hide(|i| there[i]);
     }
     Ok(samples)
+}
+
+/// A note on levels that are not the numbers in the file; `by` names what replaced them.
+pub(super) fn palette_note(by: &str) -> String {
+    format!("the levels are the shades of the file's palette, in 8 bits, not the numbers that are stored ({by})")
 }
 
 /// Unpacks samples of 1, 2 or 4 bits; the first is in the highest bits, and each row fills whole bytes.

@@ -2,9 +2,10 @@
 
 use super::kind::{Kind, Values};
 use super::picture::{DECODING, Samples, Wanted};
-use super::png::unpacked;
-use super::tiff_pages::pages;
+use super::png::{palette_note, unpacked};
+use super::tiff_pages::{Pages, Place, pages};
 use super::tiff_tags::{Shades, Tags, tags};
+use super::turn::Orientation;
 use crate::fault::{Fault, Result};
 use std::borrow::Cow;
 use std::io::Cursor;
@@ -22,6 +23,22 @@ fn strange(e: &dyn std::fmt::Display) -> Fault {
         .next("save it as a TIFF without compression, or with LZW or deflate")
 }
 
+/// A copy of a file whose list of pages begins at another directory.
+fn beginning_at(bytes: &[u8], directory: u64) -> Vec<u8> {
+    let mut copy = bytes.to_vec();
+    let big_endian = bytes.starts_with(b"MM");
+    // BigTIFF: 64-bit offsets.
+    let (at, length) = if bytes.get(2..4).is_some_and(|v| v.contains(&43)) { (8, 8) } else { (4, 4) };
+    let mut number = directory.to_be_bytes()[8 - length..].to_vec();
+    if !big_endian {
+        number.reverse();
+    }
+    if let Some(place) = copy.get_mut(at..at + length) {
+        place.copy_from_slice(&number);
+    }
+    copy
+}
+
 fn open(bytes: &[u8], page: usize) -> Result<Decoder<Cursor<&[u8]>>> {
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(|e| strange(&e))?;
     if page > 0 {
@@ -33,28 +50,40 @@ fn open(bytes: &[u8], page: usize) -> Result<Decoder<Cursor<&[u8]>>> {
 pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     let pages = pages(&mut open(bytes, 0)?)?;
     let chosen = pages.chosen(wanted.page)?;
-    let mut samples = page(bytes, chosen, wanted)?;
+    let (mut samples, turned) = page(bytes, chosen, wanted, Orientation::UPRIGHT)?;
     samples.says.notes.extend(pages.note(chosen));
-    match pages.masks[..] {
-        [] => Ok(samples),
-        [mask] => {
-            let size = Some([samples.width, samples.height]);
-            let mask = page(bytes, mask, &Wanted { size, ..*wanted })?;
-            samples.hide(|i| f64::from(mask.get(i, 0) != 0.0));
-            Ok(samples)
-        }
-        _ => Err(Fault::input(format!("has {} masks (NewSubfileType, tag 254)", pages.masks.len()))
-            .cause("masks of several pages or of reduced copies")
-            .next("save that page with its mask as a separate file")),
+    whole_film(&samples, &pages, wanted)?;
+    if let Some(mask) = pages.mask(chosen)? {
+        let size = Some([samples.width, samples.height]);
+        let (mask, _) = page(bytes, mask, &Wanted { size, ..*wanted }, turned)?;
+        samples.hide(|i| f64::from(mask.get(i, 0) != 0.0));
+    }
+    Ok(samples)
+}
+
+/// Refuses a film whose other pictures are in no list of pages, unless the first is asked for.
+fn whole_film(samples: &Samples, pages: &Pages, wanted: &Wanted) -> Result<()> {
+    match samples.says.pictures {
+        Some(said) if said > pages.pictures() && wanted.page.is_none() => Err(Fault::input(format!(
+            "says that it holds {said} pictures, and lists {} (ImageJ, tag 270)",
+            pages.pictures()
+        ))
+        .cause("a stack of ImageJ; which of its pictures is meant is not said")
+        .next("save that picture as a separate file; import-map takes --page 1 for the first")),
+        _ => Ok(()),
     }
 }
 
-/// One page, upright.
-fn page(bytes: &[u8], index: usize, wanted: &Wanted) -> Result<Samples> {
+/// One page, upright, and how it was turned. A page that states no orientation has the one of its picture, `above`.
+fn page(bytes: &[u8], place: Place, wanted: &Wanted, above: Orientation) -> Result<(Samples, Orientation)> {
+    let copy = place.listed.is_none().then(|| beginning_at(bytes, place.at));
+    let bytes = copy.as_deref().unwrap_or(bytes);
+    let index = place.listed.unwrap_or(0);
     let mut decoder = open(bytes, index)?;
     let (width, height) = decoder.dimensions().map_err(|e| strange(&e))?;
     let tags = tags(&mut decoder)?;
-    wanted.fits(tags.orientation, [width, height])?;
+    let orientation = tags.orientation.unwrap_or(above);
+    wanted.fits(orientation.number, [width, height])?;
     let plain = as_black_is_zero(bytes, &mut decoder, &tags)?;
     let mut decoder = match &plain {
         Cow::Borrowed(_) => decoder,
@@ -78,14 +107,14 @@ fn page(bytes: &[u8], index: usize, wanted: &Wanted) -> Result<Samples> {
         let n = tags.samples;
         values = values.picked((0..pixels * n).map(|k| (k % n) * pixels + k / n));
     }
-    let Tags { kind, samples: channels, orientation, says, .. } = tags;
+    let Tags { kind, samples: channels, says, .. } = tags;
     let samples = Samples { width, height, channels, kind, values, hidden: None, veiled: 0, says };
     let samples = match tags.shades {
         Shades::Palette => coloured(samples, &tags.palette),
         _ if tags.alpha => samples.parted(kind.most().unwrap_or(1.0)),
         _ => samples,
     };
-    Ok(samples.upright(orientation))
+    Ok((samples.upright(orientation), orientation))
 }
 
 /// The `tiff` crate inverts the samples of a picture whose white is 0, and reads no palettes or masks. It gets a copy
@@ -158,6 +187,9 @@ fn coloured(mut samples: Samples, palette: &[u16]) -> Samples {
     let numbers: Vec<usize> = (0..samples.pixel_count()).map(|i| samples.get(i, 0) as usize).collect();
     samples.channels = if numbers.iter().all(|n| colour(*n) == [colour(*n)[0]; 3]) { 1 } else { 3 };
     let channels = samples.channels;
+    if numbers.iter().any(|n| colour(*n).map(usize::from) != [*n; 3]) {
+        samples.says.notes.push(palette_note("ColorMap, tag 320"));
+    }
     samples.values = Values::U8(numbers.iter().flat_map(|n| colour(*n).into_iter().take(channels)).collect());
     samples.kind = Kind::Unsigned(8);
     samples

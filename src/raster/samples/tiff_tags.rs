@@ -2,15 +2,24 @@
 
 use super::kind::Kind;
 use super::says::Says;
+use super::tiff_land;
+use super::tiff_said::{Gdal, imagej_value, scale_of_imagej, spacing_of_imagej, spacing_of_ome, unit_of_imagej};
+use super::turn::Orientation;
+use super::xmp::chosen;
 use crate::fault::{Fault, Result};
 use std::io::Cursor;
 use tiff::decoder::Decoder;
+use tiff::decoder::ifd::Value;
 use tiff::tags::Tag;
 
 /// Largest text of a tag that is read, bytes.
 const MOST_TEXT: usize = 64 << 10;
 /// Scale, offset and more of a band, as XML.
 const GDAL_METADATA: Tag = Tag::Unknown(42_112);
+/// XMP, as XML.
+const XMP: Tag = Tag::Unknown(700);
+/// Keys of a map of the land, 16-bit numbers.
+const GEO_KEYS: Tag = Tag::Unknown(34_735);
 
 /// How the numbers of a page represent shades or colours (tag 262).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +39,8 @@ pub(super) struct Tags {
     /// Samples of a pixel, alpha included.
     pub samples: usize,
     pub alpha: bool,
-    pub orientation: u16,
+    /// `None` if the page states none.
+    pub orientation: Option<Orientation>,
     /// All reds of a palette, then all greens, then all blues, 16 bits.
     pub palette: Vec<u16>,
     pub says: Says,
@@ -114,17 +124,54 @@ pub(super) fn tags(file: &mut File) -> Result<Tags> {
     if order != 1 {
         return Err(refused(format!("has the bits of its bytes in order {order} (FillOrder, tag 266); allowed: 1")));
     }
-    // Writers that do not know the orientation write 0.
-    let orientation = number(file, Tag::Orientation, 1)?.max(1);
-    if orientation > 8 {
-        return Err(refused(format!("has orientation {orientation} (tag 274); allowed: 1 to 8")));
-    }
+    let (orientation, note) = orientation(file)?;
     let palette = if shades == Shades::Palette { numbers(file, Tag::ColorMap) } else { vec![] };
     if shades == Shades::Palette && (!matches!(kind, Kind::Unsigned(1..=8)) || palette.len() != 3 << bits) {
         return Err(refused(format!("has a palette of {} numbers for {kind} (ColorMap, tag 320)", palette.len())));
     }
-    let says = says(file, photometric)?;
+    let mut says = says(file, photometric)?;
+    says.notes.extend(note);
     Ok(Tags { shades, kind, bits: bits as u8, samples: usize::from(samples), alpha, orientation, palette, says })
+}
+
+/// The orientation of tag 274, else of XMP; that of a map of the land if none is stated. And a note on contradictions.
+fn orientation(file: &mut File) -> Result<(Option<Orientation>, Option<String>)> {
+    // Writers that do not know the orientation write 0.
+    let number = number(file, Tag::Orientation, 0)?;
+    if number > 8 {
+        return Err(refused(format!("has orientation {number} (tag 274); allowed: 1 to 8")));
+    }
+    let exif = (number > 0).then(|| Orientation::exif(number));
+    let (stated, note) = chosen(exif, text(file, XMP).as_deref().map(str::as_bytes))?;
+    let land = doubles(file, Tag::ModelTransformationTag).and_then(|m| tiff_land::orientation(&m));
+    let orientation = match (stated, land) {
+        // 1 is what writers put there without a thought.
+        (None | Some(Orientation { number: 1, .. }), Some(land)) => Some(land),
+        (Some(stated), Some(land)) if stated.mirrors() != land.mirrors() => {
+            return Err(Fault::input(format!(
+                "states two orientations that contradict: {} = {} and {}, which amounts to {}",
+                stated.by, stated.number, land.by, land.number
+            ))
+            .cause("one of them was kept when the picture was turned")
+            .next("take out the wrong tag"));
+        }
+        (stated, _) => stated,
+    };
+    Ok((orientation, note))
+}
+
+fn doubles(file: &mut File, tag: Tag) -> Option<Vec<f64>> {
+    file.find_tag(tag).ok().flatten()?.into_f64_vec().ok()
+}
+
+/// Pixels in a unit of length, of ImageJ: the resolution of columns and rows.
+fn resolution(file: &mut File) -> Option<[f64; 2]> {
+    let mut ratio = |tag| match file.find_tag(tag).ok().flatten()? {
+        Value::Rational(a, b) => Some(f64::from(a) / f64::from(b)),
+        _ => None,
+    };
+    let [x, y] = [ratio(Tag::XResolution)?, ratio(Tag::YResolution)?];
+    (x > 0.0 && y > 0.0 && x.is_finite() && y.is_finite()).then_some([x, y])
 }
 
 fn says(file: &mut File, photometric: u16) -> Result<Says> {
@@ -143,79 +190,25 @@ fn says(file: &mut File, photometric: u16) -> Result<Says> {
             .next("correct the tag, or take it out")
         })?);
     }
-    let gdal = text(file, GDAL_METADATA).map(|xml| scale_of_gdal(&xml)).transpose()?.flatten();
-    let imagej = text(file, Tag::ImageDescription).map(|t| scale_of_imagej(&t)).transpose()?.flatten();
+    let gdal = text(file, GDAL_METADATA).map(|xml| Gdal::of(&xml)).transpose()?.unwrap_or_default();
+    let description = text(file, Tag::ImageDescription).unwrap_or_default();
+    let imagej = scale_of_imagej(&description)?;
     if let Some(([factor, offset], by)) =
-        gdal.map(|s| (s, "GDAL, tag 42112")).or(imagej.map(|s| (s, "ImageJ, tag 270")))
+        gdal.scale.map(|s| (s, "GDAL, tag 42112")).or(imagej.map(|s| (s, "ImageJ, tag 270")))
         && [factor, offset] != [1.0, 0.0]
     {
         says.scale = Some([factor, offset]);
         says.notes.push(format!("a sample means {factor} * sample + {offset}, as the file says ({by})"));
     }
-    if let Ok(Some(value)) = file.find_tag(Tag::ModelPixelScaleTag)
-        && let Ok([x, y, ..]) = value.into_f64_vec().as_deref()
-    {
-        says.spacing = Some([*x, *y]);
-    }
+    says.pictures = imagej_value(&description, "images").and_then(|n| n.parse().ok());
+    let keys = numbers(file, GEO_KEYS);
+    says.unit = gdal.unit.or_else(|| tiff_land::vertical_unit(&keys)).or_else(|| unit_of_imagej(&description));
+    let scale = doubles(file, Tag::ModelPixelScaleTag);
+    let matrix = doubles(file, Tag::ModelTransformationTag);
+    let land = tiff_land::spacing(scale.as_deref(), matrix.as_deref());
+    let resolution = resolution(file);
+    says.spacing =
+        land.or_else(|| spacing_of_imagej(&description, resolution)).or_else(|| spacing_of_ome(&description));
+    says.notes.extend(tiff_land::notes(scale.as_deref(), matrix.as_deref()));
     Ok(says)
-}
-
-/// Factor and offset of a linear scale, from numbers as text.
-fn line(factor: Option<&str>, offset: Option<&str>) -> Result<Option<[f64; 2]>> {
-    if factor.is_none() && offset.is_none() {
-        return Ok(None);
-    }
-    let number = |t: Option<&str>, otherwise: f64| {
-        let parsed = t.map_or(Ok(otherwise), |t| t.trim().parse::<f64>().map_err(|_| t));
-        parsed.ok().filter(|v| v.is_finite())
-    };
-    match (number(factor, 1.0), number(offset, 0.0)) {
-        (Some(factor), Some(offset)) if factor != 0.0 => Ok(Some([factor, offset])),
-        _ => Err(refused(format!("scales its samples by {factor:?} and {offset:?}, which are no usable numbers"))),
-    }
-}
-
-/// `<Item name="SCALE" sample="0" role="scale">0.01</Item>`, and the same for the offset.
-fn scale_of_gdal(xml: &str) -> Result<Option<[f64; 2]>> {
-    let item = |role: &str| {
-        let start = xml.find(&format!("role=\"{role}\""))?;
-        xml[start..].split_once('>')?.1.split('<').next()
-    };
-    line(item("scale"), item("offset"))
-}
-
-/// ImageJ stores signed whole numbers as unsigned ones and states how to undo it: `cf=0`, `c0=-32768`, `c1=1`.
-fn scale_of_imagej(description: &str) -> Result<Option<[f64; 2]>> {
-    if !description.starts_with("ImageJ") {
-        return Ok(None);
-    }
-    let value = |key: &str| description.lines().find_map(|l| l.trim().strip_prefix(key)?.strip_prefix('='));
-    match value("cf").map(str::trim) {
-        None => Ok(None),
-        Some("0") => line(value("c1"), value("c0")),
-        Some(other) => {
-            Err(refused(format!("calibrates its samples by ImageJ's function {other}; allowed: 0, a straight line"))
-                .next("in ImageJ apply the calibration and save the result as 32 bits"))
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn scales_are_read_and_strange_ones_refused() {
-        let xml = r#"<GDALMetadata><Item name="OFFSET" sample="0" role="offset">-5.5</Item>
-            <Item name="SCALE" sample="0" role="scale">0.01</Item></GDALMetadata>"#;
-        assert_eq!(scale_of_gdal(xml).unwrap(), Some([0.01, -5.5]));
-        assert_eq!(scale_of_gdal("<GDALMetadata></GDALMetadata>").unwrap(), None);
-        assert!(scale_of_gdal(r#"<Item role="scale">one</Item>"#).is_err());
-        assert!(scale_of_gdal(r#"<Item role="scale">0</Item>"#).is_err());
-        let signed = "ImageJ=1.54f\nmin=0\ncf=0\nc0=-32768.0\nc1=1.0\nvunit=gray value\n";
-        assert_eq!(scale_of_imagej(signed).unwrap(), Some([1.0, -32_768.0]));
-        assert_eq!(scale_of_imagej("ImageJ=1.54f\nimages=2").unwrap(), None);
-        assert_eq!(scale_of_imagej("cf=0\nc0=1\nc1=2").unwrap(), None);
-        assert!(scale_of_imagej("ImageJ=1\ncf=8\nc0=1\nc1=2").is_err());
-    }
 }

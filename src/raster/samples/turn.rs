@@ -1,5 +1,27 @@
 //! Turns samples upright as a file's orientation states: number 1 to 8 of TIFF's tag 274, which Exif uses too.
 
+/// An orientation with its source.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Orientation {
+    pub number: u16,
+    /// What states it, for messages.
+    pub by: &'static str,
+}
+
+impl Orientation {
+    /// A picture that is stored upright.
+    pub const UPRIGHT: Orientation = Orientation::exif(1);
+
+    pub const fn exif(number: u16) -> Orientation {
+        Orientation { number, by: "tag 274" }
+    }
+
+    /// Whether the stored picture is a mirror image of the upright one.
+    pub fn mirrors(self) -> bool {
+        matches!(self.number, 2 | 4 | 5 | 7)
+    }
+}
+
 /// Orientations that exchange width and height.
 fn across(orientation: u16) -> bool {
     (5..=8).contains(&orientation)

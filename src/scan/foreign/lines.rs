@@ -125,6 +125,7 @@ fn picture(
     })?;
     said(says, [dx, dy], stated, notes);
     let missing = missing::of_picture(stated, says, kind, levels, notes)?;
+    notes.extend(other_unit(says.unit.as_ref(), unit, "heights"));
     let light = light.map(|light| brightness(light, [width, height], notes)).transpose()?;
     let sign = if stated.rows_up { 1.0 } else { -1.0 };
     notes.push(format!(
@@ -144,6 +145,14 @@ fn picture(
 }
 
 /// Notes what the file states about itself, as far as it matters to the user.
+/// A note on a unit that the file states and that is not the one of --unit-mm.
+fn other_unit(said: Option<&(f64, String)>, unit: f64, of: &str) -> Option<String> {
+    let (mm, by) = said.filter(|(mm, _)| (mm / unit - 1.0).abs() > 0.01)?;
+    Some(format!(
+        "the file says that its {of} are in {by}, which is --unit-mm {mm}; --unit-mm {unit} is used, as stated"
+    ))
+}
+
 fn said(says: &Says, [dx, dy]: [f64; 2], stated: &Stated, notes: &mut Vec<String>) {
     notes.extend(says.notes.iter().cloned());
     if says.white_is_zero {
@@ -160,10 +169,10 @@ fn said(says: &Says, [dx, dy]: [f64; 2], stated: &Stated, notes: &mut Vec<String
                 .into(),
         );
     }
-    if let Some([x, y]) = says.spacing.filter(|s| (s[0] / dx - 1.0).abs() > 0.01 || (s[1] / dy - 1.0).abs() > 0.01) {
+    let differs = |s: &&([f64; 2], String)| (s.0[0] / dx - 1.0).abs() > 0.01 || (s.0[1] / dy - 1.0).abs() > 0.01;
+    if let Some(([x, y], by)) = says.spacing.as_ref().filter(differs) {
         notes.push(format!(
-            "the file says that its pixels are {x} x {y} apart, in a unit that it does not name (ModelPixelScale, \
-             tag 33550); {dx} x {dy} mm are used, as stated"
+            "the file says that its pixels are {x} x {y} apart, in {by}; {dx} x {dy} mm are used, as stated"
         ));
     }
 }
