@@ -173,6 +173,35 @@ fn points_that_were_not_measured_are_dropped_where_stated_and_named_where_not() 
 }
 
 #[test]
+fn a_unit_in_a_comment_that_differs_is_named() {
+    let xyz = "property float x\nproperty float y\nproperty float z\n";
+    let rows: String = points().iter().map(|p| format!("{} {} {}\n", p[0], p[1], p[2])).collect();
+    let ply = |comment: &str| {
+        format!("ply\nformat ascii 1.0\ncomment {comment}\nelement vertex 1200\n{xyz}end_header\n{rows}").into_bytes()
+    };
+    let pcd = |comment: &str| {
+        let plain = pcd(&points(), ("t", 8, "U", 1), HERE, "ascii");
+        [format!("# {comment}\n").into_bytes(), plain].concat()
+    };
+    for (comment, mm) in [
+        ("units: m", Some("1000")),
+        ("unit = inch", Some("25.4")),
+        ("units: mm", None),
+        ("sheetlight cloud, base frame, mm", None),
+        ("made with unity", None),
+    ] {
+        for file in [ply(comment), pcd(comment)] {
+            let said = made(&file, &stated(None)).unwrap().notes.join("; ");
+            assert_eq!(said.contains("as stated"), mm.is_some(), "{comment}: {said}");
+            assert!(mm.is_none_or(|mm| said.contains(&format!("--unit-mm {mm}"))), "{comment}: {said}");
+        }
+    }
+    let stated = Stated { unit_mm: Some(1000.0), ..stated(None) };
+    let own = pcd("sheetlight cloud, map frame, mm");
+    assert!(made(&own, &stated).unwrap().notes.join("; ").contains("which is --unit-mm 1;"));
+}
+
+#[test]
 fn options_that_do_nothing_to_a_cloud_are_refused() {
     let file = pcd(&points(), ("t", 8, "U", 1), HERE, "binary");
     let raw = read_foreign(&file).unwrap();

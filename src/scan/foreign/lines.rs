@@ -67,8 +67,9 @@ pub fn lines(raw: &Raw, light: Option<&Raw>, stated: &Stated) -> Result<Lines> {
             let pixels = Pixels { size: [*width, *height], levels, kind: *kind, says };
             picture(&pixels, light, unit, stated, &mut notes)?
         }
-        Raw::Points { line, points, intensity } => {
+        Raw::Points { line, points, intensity, unit: said } => {
             for_pictures_only(light, stated)?;
+            notes.extend(other_unit(said.as_ref(), unit, "coordinates"));
             let there = missing::of_cloud(stated, points, &mut notes);
             let heights = points.iter().filter(|p| there(p)).map(|p| p[2]);
             missing::suspects(stated, heights, "points", &mut notes);
@@ -124,8 +125,8 @@ fn picture(
             .next("give --spacing-mm X,Y")
     })?;
     said(says, [dx, dy], stated, notes);
-    let missing = missing::of_picture(stated, says, kind, levels, notes)?;
     notes.extend(other_unit(says.unit.as_ref(), unit, "heights"));
+    let missing = missing::of_picture(stated, says, kind, levels, notes)?;
     let light = light.map(|light| brightness(light, [width, height], notes)).transpose()?;
     let sign = if stated.rows_up { 1.0 } else { -1.0 };
     notes.push(format!(
@@ -144,7 +145,6 @@ fn picture(
     Ok(seen.map(|(i, v)| at(i, *v)).collect())
 }
 
-/// Notes what the file states about itself, as far as it matters to the user.
 /// A note on a unit that the file states and that is not the one of --unit-mm.
 fn other_unit(said: Option<&(f64, String)>, unit: f64, of: &str) -> Option<String> {
     let (mm, by) = said.filter(|(mm, _)| (mm / unit - 1.0).abs() > 0.01)?;
@@ -153,6 +153,7 @@ fn other_unit(said: Option<&(f64, String)>, unit: f64, of: &str) -> Option<Strin
     ))
 }
 
+/// Notes what the file states about itself, as far as it matters to the user.
 fn said(says: &Says, [dx, dy]: [f64; 2], stated: &Stated, notes: &mut Vec<String>) {
     notes.extend(says.notes.iter().cloned());
     if says.white_is_zero {

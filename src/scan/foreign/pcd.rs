@@ -1,7 +1,7 @@
 //! Reads a PCD (Point Cloud Library): text, binary or compressed. Its points come in lines if it is organised.
 
 use super::fields::{Number, Points, Wanted};
-use super::raw::{MOST_POINTS, Raw};
+use super::raw::{MOST_POINTS, Raw, unit_in};
 use crate::fault::{Fault, Result};
 
 /// Longest header, bytes.
@@ -33,6 +33,8 @@ struct Header {
     height: usize,
     points: usize,
     data: String,
+    /// mm in the unit that a comment states, and that comment.
+    unit: Option<(f64, String)>,
 }
 
 pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
@@ -91,7 +93,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
         other => return Err(strange(format!("its data are '{other}'"))),
     }
     let (points, intensity) = found.intensity();
-    Ok(Raw::Points { line: (h.height > 1).then_some(h.width), points, intensity })
+    Ok(Raw::Points { line: (h.height > 1).then_some(h.width), points, intensity, unit: h.unit })
 }
 
 fn header(bytes: &[u8]) -> Result<(Header, usize)> {
@@ -119,6 +121,7 @@ fn header(bytes: &[u8]) -> Result<(Header, usize)> {
             "HEIGHT" => h.height = count(&mut words)?,
             "POINTS" => h.points = count(&mut words)?,
             "DATA" => h.data = words.next().unwrap_or("nothing").to_owned(),
+            _ if key.starts_with('#') => h.unit = h.unit.or_else(|| unit_in(line.trim_start_matches(['#', ' ']))),
             _ => {}
         }
     }

@@ -1,7 +1,7 @@
 //! Reads the vertices of a PLY of any program: text, or binary in either byte order.
 
 use super::fields::{Number, Points, Wanted};
-use super::raw::{MOST_POINTS, Raw};
+use super::raw::{MOST_POINTS, Raw, unit_in};
 use crate::fault::{Fault, Result};
 
 /// Longest header, bytes.
@@ -78,7 +78,7 @@ fn strange(what: impl std::fmt::Display) -> Fault {
 }
 
 pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
-    let (layout, elements, start) = header(bytes)?;
+    let (layout, elements, start, unit) = header(bytes)?;
     let vertex = elements.iter().position(|e| e.name == "vertex").ok_or_else(|| strange("it has no vertices"))?;
     let before = &elements[..vertex];
     let e = &elements[vertex];
@@ -140,17 +140,18 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
         }
     }
     let (points, intensity) = found.intensity();
-    Ok(Raw::Points { line: None, points, intensity })
+    Ok(Raw::Points { line: None, points, intensity, unit })
 }
 
-fn header(bytes: &[u8]) -> Result<(Layout, Vec<Element>, usize)> {
+/// Layout, elements, start of the records, and the unit that a comment states.
+fn header(bytes: &[u8]) -> Result<(Layout, Vec<Element>, usize, Option<(f64, String)>)> {
     const END: &[u8] = b"\nend_header";
     let head = &bytes[..bytes.len().min(MOST_HEADER)];
     let end = head.windows(END.len()).position(|w| w == END).ok_or_else(|| strange("its header has no end"))?;
     let end = end + 1;
     let line = head[end..].iter().position(|&b| b == b'\n').ok_or_else(|| strange("its header has no end"))?;
     let text = std::str::from_utf8(&head[..end]).map_err(strange)?;
-    let (mut layout, mut elements) = (None, Vec::<Element>::new());
+    let (mut layout, mut elements, mut unit) = (None, Vec::<Element>::new(), None);
     for l in text.lines() {
         let words: Vec<&str> = l.split_ascii_whitespace().collect();
         match words[..] {
@@ -178,10 +179,11 @@ fn header(bytes: &[u8]) -> Result<(Layout, Vec<Element>, usize)> {
                 let holds = holds.ok_or_else(|| strange(format!("'{l}'")))?;
                 elements.last_mut().ok_or_else(|| strange(l))?.properties.push((holds, name.into()));
             }
+            ["comment" | "obj_info", ..] => unit = unit.or_else(|| unit_in(l.trim_start().split_once(' ')?.1)),
             _ => {}
         }
     }
-    Ok((layout.ok_or_else(|| strange("its format is not stated"))?, elements, end + line + 1))
+    Ok((layout.ok_or_else(|| strange("its format is not stated"))?, elements, end + line + 1, unit))
 }
 
 fn number(name: &str) -> Option<Number> {

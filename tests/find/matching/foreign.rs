@@ -151,7 +151,7 @@ fn nothing_is_guessed() {
         kind: Kind::Unsigned(8),
         says: Says::default(),
     };
-    let scattered = Raw::Points { line: None, points: vec![[0.0, 0.0, 1.0]; 100], intensity: None };
+    let scattered = Raw::Points { line: None, points: vec![[0.0, 0.0, 1.0]; 100], intensity: None, unit: None };
     let full =
         Stated { unit_mm: Some(0.1), spacing_mm: Some([1.0, 1.0]), missing: Some(Some(0.0)), ..Stated::default() };
     assert_eq!(lines(&picture, None, &full).unwrap().points.len(), 128);
