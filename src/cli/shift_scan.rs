@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 ///
 /// The stripe runs along image columns; the bed moves between pictures. With s = shift / pixels-per-mm the height is
 /// D s / (d + s). D is the camera's height above the bed, d the laser's distance from the camera. Rows that always
-/// show the bare bed give the zero of each picture.
+/// show the bare bed give the zero of each picture. Each picture counts as one step of the travel. Pictures of another
+/// size, copies, and pictures that are turned among the others are refused by name.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight shift-scan photos/cube --pixels-per-mm 10.6277 --camera-height-mm 80 \\
@@ -99,6 +100,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         grid(&cloud, &options)?.save(&part)?;
     }
     set.commit()?;
+    report.remarks.iter().for_each(|said| console.warn(said));
     console.result(&report, &summary(&report));
     Ok(())
 }

@@ -3,5 +3,7 @@
 //! Frame and unit: x along the stripe, y along the travel, z up from the bed; mm (docs/math.md, Shift).
 
 mod crossing;
+mod folder;
+mod judge;
 pub(super) mod plateau;
 pub(super) mod scan;

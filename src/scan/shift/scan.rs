@@ -3,6 +3,8 @@
 //! Frame and unit: x along the stripe, y along the travel, z up from the bed; mm (docs/math.md, Shift (1)).
 
 use super::crossing::{Crossing, stripe_by_row};
+use super::folder::{Alike, gaps, name, pictures};
+use super::judge::{beds, below};
 use super::plateau::{Plateau, plateau, spread};
 use crate::fault::{Fault, Result};
 use crate::raster::{Channel, Depth};
@@ -78,6 +80,25 @@ impl ShiftRig {
     /// Whether a row always shows the bare bed.
     fn is_bed(&self, row: f64) -> bool {
         self.bed_rows.iter().any(|[a, b]| (f64::from(*a)..=f64::from(*b)).contains(&row))
+    }
+
+    /// Refuses bed rows that begin below the pictures' last row.
+    fn rows_within(&self, height: u32) -> Result<()> {
+        match self.bed_rows.iter().find(|[first, _]| *first >= height) {
+            None => Ok(()),
+            Some([first, last]) => Err(Fault::usage(format!(
+                "bed rows {first}..{last}: the pictures have the rows 0..{}",
+                height.saturating_sub(1)
+            ))
+            .cause("rows of another size of picture, or columns instead of rows")
+            .next("give rows that always show the bare bed")),
+        }
+    }
+
+    /// First and last of the rows that show the bed.
+    fn bed_span(&self) -> [f64; 2] {
+        let rows = || self.bed_rows.iter().flatten().map(|v| f64::from(*v));
+        [rows().fold(f64::INFINITY, f64::min), rows().fold(0.0, f64::max)]
     }
 
     /// Height of a stripe that is shifted by `px`, and d(height)/d(px); docs/math.md, Shift (1).
@@ -182,6 +203,15 @@ pub struct ShiftReport {
     pub bed_noise_mm: f64,
     /// The level surface above the bed; `None` if the points do not form one.
     pub plateau: Option<Plateau>,
+    /// What is strange about the pictures, a sentence each.
+    pub remarks: Vec<String>,
+}
+
+/// The error for pictures without the bed.
+fn no_bed(folder: &Path, pictures: usize, cause: &str, next: &str) -> Fault {
+    Fault::refused(format!("{}: 0 of {pictures} pictures show the bed in the given rows", folder.display()))
+        .cause(cause)
+        .next(next)
 }
 
 /// Scans a folder of pictures, in the order of their names; `reference` holds pictures of the empty bed.
@@ -195,30 +225,32 @@ pub fn shift_scan(
     rig.check()?;
     let (names, empty) = (pictures(folder)?, reference.map_or(Ok(vec![]), pictures)?);
     let all = names.len() + empty.len();
-    let mut done = 0;
-    let mut rows = |path: &PathBuf| {
+    let (mut done, mut alike) = (0, Alike::default());
+    let mut rows = |path: &PathBuf, alike: &mut Alike| {
         let depth = Depth {
             bits: 8,
             declared: "a shift scan takes",
             correct: "export the pictures with 8 bits a pixel",
             saturates: true,
         };
-        let found = stripe_by_row(&crate::raster::load(path, rig.channel, depth)?);
+        let image = crate::raster::load(path, rig.channel, depth)?;
+        alike.fits(path, &image)?;
+        rig.rows_within(image.height)?;
+        let found = stripe_by_row(&image);
         done += 1;
         progress(done, all);
-        Ok(found)
+        Ok((found, image))
     };
-    let bare = empty.iter().map(&mut rows).collect::<Result<Vec<_>>>()?;
+    let bare = empty.iter().map(|path| Ok(rows(path, &mut alike)?.0)).collect::<Result<Vec<_>>>()?;
     let zero = match reference {
         None => Zero::default(),
         Some(folder) => Zero::of(&bare, rig).ok_or_else(|| {
-            Fault::refused(format!(
-                "{}: 0 of {} pictures show the bed in the given rows",
-                folder.display(),
-                empty.len()
-            ))
-            .cause("no stripe there, or pictures of another setup")
-            .next("give pictures of the empty bed, taken like the others, or omit --reference")
+            no_bed(
+                folder,
+                empty.len(),
+                "no stripe there, or pictures of another setup",
+                "give pictures of the empty bed, taken like the others, or omit --reference",
+            )
         })?,
     };
     let mut report = ShiftReport {
@@ -229,38 +261,38 @@ pub fn shift_scan(
         reference: empty.len(),
         bed_noise_mm: f64::NAN,
         plateau: None,
+        remarks: gaps(&names, rig.travel_mm).into_iter().collect(),
     };
-    let mut cloud = Vec::new();
+    let (mut cloud, mut lines) = (Vec::new(), Vec::new());
     for (i, path) in names.iter().enumerate() {
-        let found = points(&rows(path)?, i as u32, rig, &zero);
+        let (crossings, image) = rows(path, &mut alike)?;
+        alike.differs(path, &image)?;
+        lines.push((name(path), bed_line(&crossings, rig)));
+        let found = points(&crossings, i as u32, rig, &zero);
         if found.is_empty() {
-            report.without_bed.push(path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()));
+            report.without_bed.push(name(path));
         }
         cloud.extend(found);
     }
+    if report.without_bed.len() == names.len() {
+        return Err(no_bed(
+            folder,
+            names.len(),
+            "--bed-rows names other rows, the stripe runs along the rows, or it is too faint in this channel",
+            "look at a picture, and give rows in which the stripe lies on the bare bed, or another --channel",
+        ));
+    }
+    report.remarks.extend(alike.remark(rig.travel_mm));
+    report.remarks.extend(beds(&lines, rig.bed_span(), alike.size())?);
     report.points = cloud.len();
     let on_bed = |p: &CloudPoint| rig.is_bed(f64::from(p.v));
     let bed: Vec<f64> = cloud.iter().filter(|p| on_bed(p)).map(|p| f64::from(p.position[2])).collect();
     report.bed_noise_mm = spread(&bed).1;
+    let off: Vec<CloudPoint> = cloud.iter().filter(|p| !on_bed(p)).copied().collect();
+    report.remarks.extend(below(&off, &lines.into_iter().map(|(name, _)| name).collect::<Vec<_>>()));
     let high = |p: &&CloudPoint| !on_bed(p) && f64::from(p.position[2]) > min_height_mm;
     report.plateau = plateau(&cloud.iter().filter(high).copied().collect::<Vec<_>>());
     Ok((report, cloud))
-}
-
-fn pictures(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Fault::read(folder, e))?;
-    let known = |p: &PathBuf| {
-        let extension = p.extension().map(|e| e.to_string_lossy().to_lowercase());
-        extension.is_some_and(|e| ["jpg", "jpeg", "png", "tif", "tiff", "bmp", "pgm"].contains(&e.as_str()))
-    };
-    let mut names: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(known).collect();
-    names.sort_by_key(|p| crate::files::natural(&p.to_string_lossy()));
-    if names.is_empty() {
-        return Err(Fault::input(format!("{}: holds no pictures", folder.display()))
-            .cause("another folder, or pictures of another format than JPEG, PNG, TIFF, BMP, PGM")
-            .next("give the folder with the pictures"));
-    }
-    Ok(names)
 }
 
 #[cfg(test)]
@@ -330,6 +362,58 @@ mod tests {
         };
         assert!(off(&zero) < 0.01 && off(&Zero::default()) > 0.2, "{} {}", off(&zero), off(&Zero::default()));
         assert!(Zero::of(&[vec![None; 300]], &rig()).is_none());
+    }
+
+    #[test]
+    fn pictures_that_do_not_go_together_are_refused_by_name() {
+        let scan = |fill: &dyn Fn(&Path)| {
+            let dir = tempfile::tempdir().unwrap();
+            for k in 0..12u32 {
+                // A stripe that widens makes each picture another one.
+                let image = picture(if k > 5 { 30.0 + f64::from(k) } else { f64::from(k) * 0.3 });
+                crate::raster::save_png(&image, &dir.path().join(format!("f{k:02}.png"))).unwrap();
+            }
+            fill(dir.path());
+            let rig = ShiftRig { bed_rows: vec![[5, 60], [240, 290]], ..rig() };
+            shift_scan(dir.path(), None, &rig, 1.0, &mut |_, _| {}).map(|(report, _)| report)
+        };
+        let plain = scan(&|_| {}).unwrap();
+        assert!(plain.remarks.is_empty() && plain.points > 1000, "{:?}", plain.remarks);
+        let at = |dir: &Path, k: u32| dir.join(format!("f{k:02}.png"));
+        let half = |dir: &Path| {
+            let small = Image::from_u8(200, 150, vec![9; 200 * 150]);
+            crate::raster::save_png(&small, &at(dir, 8)).unwrap();
+        };
+        assert!(scan(&half).unwrap_err().what.contains("f08.png: is 200x150, f00.png is 400x300"));
+        let webp = |dir: &Path| std::fs::rename(at(dir, 8), dir.join("f08.webp")).unwrap();
+        assert!(scan(&webp).unwrap_err().what.contains("f08.webp: is a picture of a format that is not read"));
+        let copy = |dir: &Path| drop(std::fs::copy(at(dir, 3), dir.join("f03 (1).png")).unwrap());
+        assert!(scan(&copy).unwrap_err().what.contains("holds the same picture as"));
+        let both = |dir: &Path| drop(std::fs::copy(at(dir, 3), dir.join("f03.bmp")).unwrap());
+        assert!(scan(&both).unwrap_err().cause.contains("two formats"));
+        let mirrored = |dir: &Path| {
+            let image = picture(38.0);
+            let level = |i: u32| image.get(399 - i % 400, i / 400) as u8;
+            let other = Image::from_u8(400, 300, (0..400 * 300).map(level).collect());
+            crate::raster::save_png(&other, &at(dir, 8)).unwrap();
+        };
+        assert!(scan(&mirrored).unwrap_err().what.contains("f08.png: shows the bed's stripe"));
+        let lost = |dir: &Path| std::fs::remove_file(at(dir, 8)).unwrap();
+        assert!(scan(&lost).unwrap().remarks[0].contains("f07.png and f09.png"));
+        let black = |dir: &Path| {
+            let image = Image::from_u8(400, 300, vec![9; 400 * 300]);
+            (0..12).for_each(|k| crate::raster::save_png(&image, &at(dir, k)).unwrap());
+        };
+        assert!(scan(&black).unwrap_err().what.contains("0 of 12 pictures show the bed"));
+        let dir = tempfile::tempdir().unwrap();
+        crate::raster::save_png(&picture(0.0), &at(dir.path(), 0)).unwrap();
+        let below = ShiftRig { bed_rows: vec![[600, 700]], ..rig() };
+        let fault = shift_scan(dir.path(), None, &below, 1.0, &mut |_, _| {}).unwrap_err();
+        assert!(fault.what.contains("bed rows 600..700: the pictures have the rows 0..299"), "{fault}");
+        let other = ShiftRig { raises: Side::Right, ..rig() };
+        crate::raster::save_png(&picture(40.0), &at(dir.path(), 0)).unwrap();
+        let report = shift_scan(dir.path(), None, &other, 1.0, &mut |_, _| {}).unwrap().0;
+        assert!(report.remarks[0].contains("more below the bed than above it"), "{:?}", report.remarks);
     }
 
     #[test]
