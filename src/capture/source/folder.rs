@@ -6,7 +6,7 @@ use crate::capture::clock::now_ns;
 use crate::capture::format::Format;
 use crate::capture::picture::{Event, Picture, PictureSource};
 use crate::fault::{Fault, Result};
-use crate::raster::{Channel, Depth, load};
+use crate::raster::{Channel, Depth, load, pictures_in};
 use notify::Watcher;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -17,7 +17,6 @@ use std::time::{Duration, Instant};
 const SETTLED: Duration = Duration::from_millis(60);
 /// A picture that does not decode is given up after this time.
 const SPOILT: Duration = Duration::from_secs(2);
-const KINDS: [&str; 7] = ["png", "jpg", "jpeg", "tif", "tiff", "bmp", "pgm"];
 
 /// A folder as a camera.
 pub struct FolderCamera {
@@ -34,6 +33,8 @@ pub struct FolderCamera {
     looked: Instant,
     /// The first picture, which determined the format.
     first: Option<Box<Picture>>,
+    /// Why the last picture was given up.
+    spoilt: Option<Fault>,
 }
 
 impl FolderCamera {
@@ -51,7 +52,7 @@ impl FolderCamera {
         };
         let mut watcher = notify::recommended_watcher(send).map_err(|e| cannot(&e))?;
         watcher.watch(folder, notify::RecursiveMode::NonRecursive).map_err(|e| cannot(&e))?;
-        let done = pictures(folder)?.into_iter().collect();
+        let done = pictures_in(folder)?.into_iter().map(|n| n.path).collect();
         let mut camera = FolderCamera {
             folder: folder.to_owned(),
             bits,
@@ -63,6 +64,7 @@ impl FolderCamera {
             next: 0,
             looked: Instant::now(),
             first: None,
+            spoilt: None,
         };
         match camera.wait(patience) {
             Event::Picture(first) => {
@@ -70,9 +72,7 @@ impl FolderCamera {
                 camera.first = Some(first);
                 Ok(camera)
             }
-            Event::Incomplete { why, .. } => Err(Fault::input(why)
-                .cause("another depth than the one stated, or the other program writes no pictures")
-                .next("state the sensor's depth: folder:PATH?bits=12")),
+            Event::Incomplete { why, .. } => Err(camera.spoilt.unwrap_or_else(|| Fault::input(why))),
             _ => Err(Fault::input(format!("{}: no new picture within {} s", folder.display(), patience.as_secs()))
                 .cause("the other program writes elsewhere, or is not running")
                 .next("start it, or give the folder that it fills")),
@@ -100,11 +100,12 @@ impl FolderCamera {
 
     fn look(&mut self) -> Option<Event> {
         self.looked = Instant::now();
-        let names = match pictures(&self.folder) {
+        let names = match pictures_in(&self.folder) {
             Ok(names) => names,
             Err(fault) => return Some(Event::Lost(fault)),
         };
-        let path = names.into_iter().find(|p| !self.done.contains(p))?;
+        let named = names.into_iter().find(|n| !self.done.contains(&n.path))?;
+        let path = named.path.clone();
         let size = std::fs::metadata(&path).map_or(0, |m| m.len());
         let now = Instant::now();
         let seen = self.growing.entry(path.clone()).or_insert((size, now, now));
@@ -116,6 +117,10 @@ impl FolderCamera {
             return None;
         }
         let given_up = seen.2.elapsed() > SPOILT;
+        if !named.read {
+            // The same picture may still come in a format that is read. Until then this one holds its place.
+            return given_up.then(|| self.give_up(path, named.unread()));
+        }
         let depth = Depth {
             bits: self.bits,
             declared: "the camera's name says",
@@ -133,9 +138,15 @@ impl FolderCamera {
                 let why = format!("{}: is {}, the first one was {}", path.display(), Format::of(&image), self.format);
                 Some(Event::Incomplete { id: self.over(path), why })
             }
-            Err(fault) if given_up => Some(Event::Incomplete { id: self.over(path), why: fault.what }),
+            Err(fault) if given_up => Some(self.give_up(path, fault)),
             Err(_) => None,
         }
+    }
+
+    fn give_up(&mut self, path: PathBuf, fault: Fault) -> Event {
+        let why = fault.what.clone();
+        self.spoilt = Some(fault);
+        Event::Incomplete { id: self.over(path), why }
     }
 
     fn over(&mut self, path: PathBuf) -> u64 {
@@ -144,16 +155,6 @@ impl FolderCamera {
         self.next += 1;
         self.next - 1
     }
-}
-
-/// The pictures of a folder in natural order; files whose names begin with a dot are still being written.
-fn pictures(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Fault::read(folder, e))?;
-    let kind = |p: &Path| p.extension().is_some_and(|e| KINDS.contains(&&*e.to_string_lossy().to_lowercase()));
-    let hidden = |p: &Path| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with('.'));
-    let mut all: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(|p| kind(p) && !hidden(p)).collect();
-    all.sort_by_cached_key(|p| crate::files::natural(&p.to_string_lossy()));
-    Ok(all)
 }
 
 impl PictureSource for FolderCamera {
