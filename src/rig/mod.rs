@@ -26,6 +26,7 @@ pub use hash::hash_text;
 pub use joint::{Joint, JointCovariance};
 pub use kind::{Kind, Place, Units};
 pub use measured::Measured;
+pub(crate) use once::parse as json_once;
 pub use plan::{RigForecast, RigPlan};
 pub use seal::{sealed, unsealed};
 pub use volume::Volume;

@@ -78,6 +78,8 @@ fn what_the_lens_cannot_say_is_refused_by_its_name() {
     let kalibr = std::fs::read_to_string(file("kalibr.yaml")).unwrap();
     let ros = std::fs::read_to_string(file("ros.yaml")).unwrap();
     let second = kalibr.replace("cam0", "cam1");
+    let stereo = "image_size: [640, 480]\nM1: [600, 0, 318, 0, 600, 242, 0, 0, 1]\nD1: [0, 0, 0, 0, 0]\n\
+                  M2: [660, 0, 288, 0, 660, 252, 0, 0, 1]\nD2: [0, 0, 0, 0, 0]\n";
     for (text, wanted) in [
         (kalibr.replace("radtan", "equidistant"), "'equidistant'"),
         (kalibr.replace("pinhole", "omni"), "'omni'"),
@@ -85,11 +87,34 @@ fn what_the_lens_cannot_say_is_refused_by_its_name() {
         (ros.replace("data: [-0.210000, 0.070000,", "data: ["), "the lens: 3 numbers"),
         (ros.replace("image_width: 640\n", ""), "size of the pictures"),
         (kalibr.clone() + &second, "2 cameras: cam0, cam1"),
+        (stereo.to_owned(), "2 camera matrices: M1, M2"),
+        ("{\"camera_matrix\": 1, \"image_size\": [640, 480], \"camera_matrix\": 2}".into(), "camera_matrix"),
+        ("{\"units\": \"inch\", \"laser_plane_camera\": {}}".into(), "lengths are read in mm only"),
     ] {
         let path = dir.path().join("c.yaml");
         std::fs::write(&path, &text).unwrap();
         let fault = Values::load(&path).err().unwrap_or_else(|| panic!("'{wanted}' was taken: {text}"));
         assert!(fault.what.contains(wanted) && !fault.next.is_empty(), "'{wanted}' is not in: {fault}");
+    }
+}
+
+#[test]
+fn a_matrix_of_pictures_of_another_size_is_asked_about() {
+    let dir = tempfile::tempdir().unwrap();
+    let (path, station) = (dir.path().join("c.yaml"), dir.path().join("st").to_str().unwrap().to_owned());
+    let text = std::fs::read_to_string(file("ros.yaml")).unwrap();
+    for (size, accepted) in [([640, 480], true), ([320, 240], false), ([1280, 960], false), ([600, 440], true)] {
+        let [width, height] = size.map(|s| s.to_string());
+        let other = text.replace("image_width: 640", &format!("image_width: {width}"));
+        std::fs::write(&path, other.replace("image_height: 480", &format!("image_height: {height}"))).unwrap();
+        let import = ["station", "import", path.to_str().unwrap(), "--station", &station];
+        if accepted {
+            sheetlight(&import);
+            continue;
+        }
+        let (_, said) = sheetlight_fails(&import);
+        assert!(said.contains("principal point") && said.contains("--as-stated"), "{size:?}: {said}");
+        sheetlight(&[&import[..], &["--as-stated"]].concat());
     }
 }
 

@@ -7,8 +7,9 @@ use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Axis, AxisKind, Base, Camera, ORTHONORMAL_WARN, Plane, Ray, Rigid, Vec3};
 use crate::rig::{
-    Calibration, Covariance, HandEye, Kind, Quality, ROBOT_SIGMA_DEG, ROBOT_SIGMA_MM, Rig, Verdict, asked,
+    Calibration, Covariance, HandEye, Kind, Quality, ROBOT_SIGMA_DEG, ROBOT_SIGMA_MM, Rig, Verdict, asked, json_once,
 };
+use serde_json::Value;
 use std::path::Path;
 
 /// The values of a rig as one JSON object; every entry may be missing, other keys are ignored.
@@ -64,9 +65,18 @@ impl Values {
         if let Some((camera, said)) = super::foreign::camera(&text).map_err(|e| e.at(path.display()))? {
             return Ok(Values { intrinsics: Some(camera), read_as: Some(said), ..Values::default() });
         }
-        serde_json::from_str(&text).map_err(|e| {
+        // A key that is there twice has no value: programs differ in which of them they take.
+        let file = json_once(text.trim_start_matches('\u{feff}'));
+        if let Ok(Value::Object(map)) = &file {
+            super::stated::check(map).map_err(|e| e.at(path.display()))?;
+        }
+        file.and_then(|_| serde_json::from_str(&text)).map_err(|e| {
             Fault::input(format!("{}: contains no rig values: {e}", path.display()))
-                .cause(crate::files::slip_in(&text, e.line(), "not JSON, or an entry of another shape"))
+                .cause(crate::files::slip_in(
+                    &text,
+                    e.line(),
+                    "not JSON, an entry of another shape, or a key that is there twice",
+                ))
                 .next(
                     "use the keys intrinsics, flange_T_camera, laser_plane_camera, pointer_camera, base_T_camera, \
                        linear_axis, turntable of docs/file-formats.md",
@@ -149,6 +159,7 @@ impl Values {
         let base_camera = base_camera.transpose()?;
         let (laser_plane, pointer, hand_eye) = (plane.transpose()?, pointer.transpose()?, hand_eye.transpose()?);
         if !as_stated {
+            self.intrinsics.as_ref().map_or(Ok(()), of_its_pictures).map_err(|e| e.at(source.display()))?;
             laser_plane.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
             pointer.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
             hand_eye.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
@@ -171,6 +182,26 @@ impl Values {
 
 fn no_length(key: &str) -> Fault {
     Fault::input(format!("{key} has no length")).cause("all zeros").next("give a direction")
+}
+
+/// A principal point farther from the middle than this share of the picture, along both sides alike, is that of a
+/// picture of another size.
+const OFF_MIDDLE: f64 = 0.2;
+
+/// Refuses a matrix that looks like one of pictures of another size.
+fn of_its_pictures(c: &Intrinsics) -> Result<()> {
+    let [x, y] = [(c.cx + 0.5) / f64::from(c.width), (c.cy + 0.5) / f64::from(c.height)];
+    let outside = [x, y].iter().any(|s| !(0.0..=1.0).contains(s));
+    let scaled = (x - y).abs() < 0.05 && (x - 0.5).abs() > OFF_MIDDLE;
+    if !outside && !scaled {
+        return Ok(());
+    }
+    Err(Fault::refused(format!(
+        "the principal point is at {:.1}, {:.1} px of pictures of {}x{} px",
+        c.cx, c.cy, c.width, c.height
+    ))
+    .cause("the matrix is that of larger or smaller pictures (binned, scaled) than the size that is stated")
+    .next("give matrix and size of the same pictures, or confirm with --as-stated (a sensor's part, a shifted lens)"))
 }
 
 /// Largest deviation from unit length of a direction with four decimals; beyond it the meaning of the other numbers

@@ -3,6 +3,7 @@
 mod assumed;
 mod exchange;
 mod foreign;
+mod stated;
 
 pub use assumed::Sigmas;
 pub use exchange::{PlaneValue, Values};

@@ -55,10 +55,32 @@ pub fn camera(text: &str) -> Result<Option<(Intrinsics, String)>> {
     if file.get("camera_model").is_some() {
         return kalibr(&file).map(Some);
     }
+    single(map)?;
     if any(&file, &MATRIX).is_none() || file.get("intrinsics").is_some() {
         return Ok(None);
     }
     opencv(&file).map(Some)
+}
+
+/// Refuses a file with the matrices of two cameras: M1 and M2, `camera_matrix_left` and `camera_matrix_right`.
+fn single(map: &serde_json::Map<String, Value>) -> Result<()> {
+    let cameras: Vec<&str> = map.iter().filter(|(_, v)| pinhole(v)).map(|(k, _)| k.as_str()).collect();
+    let second = |name: &&&str| {
+        let name = name.to_lowercase();
+        name.ends_with('2') || name.contains("right")
+    };
+    if cameras.len() < 2 || !cameras.iter().any(|name| second(&name)) {
+        return Ok(());
+    }
+    Err(Fault::input(format!("holds {} camera matrices: {}", cameras.len(), cameras.join(", ")))
+        .cause("a calibration of a pair of cameras; a station has one")
+        .next("leave one of them in the file, with its lens"))
+}
+
+/// Whether a value is a camera matrix.
+fn pinhole(v: &Value) -> bool {
+    matches!(numbers(v).as_deref(), Some(&[fx, _, cx, 0.0, fy, cy, 0.0, 0.0, 1.0])
+        if fx > 1.0 && fy > 1.0 && cx > 1.0 && cy > 1.0)
 }
 
 fn any<'a>(v: &'a Value, names: &[&str]) -> Option<&'a Value> {

@@ -8,7 +8,7 @@ pub fn read(text: &str) -> Result<Value> {
     let text = text.trim_start_matches('\u{feff}');
     match text.trim_start().chars().next() {
         Some('<') => xml(text),
-        Some('{') => serde_json::from_str(text).map_err(|e| {
+        Some('{') => crate::rig::json_once(text).map_err(|e| {
             Fault::input(format!("holds no JSON: {e}"))
                 .cause(crate::files::slip_in(text, e.line(), "a truncated or edited file"))
                 .next("write the calibration again")
@@ -45,6 +45,11 @@ fn xml(text: &str) -> Result<Value> {
                 return Err(broken(&format!("'{name}' ends, '{own}' is open")));
             }
             let value = if map.is_empty() { words(&content) } else { Value::Object(map) };
+            // The items of a list are all called '_'.
+            let twice = own != "_" && stack.last().is_some_and(|(_, map, _)| map.contains_key(&own));
+            if twice {
+                return Err(broken(&format!("'{own}' is there for the second time")));
+            }
             stack.last_mut().expect("checked above").1.insert(own, value);
         } else if !tag.ends_with('/') {
             let name = tag.split_whitespace().next().unwrap_or("").to_owned();
@@ -78,7 +83,8 @@ mod tests {
             <rows>1</rows>\n  <dt>d</dt>\n  <data>\n    1. 2.\n  -3e-01</data></K>\n</opencv_storage>\n";
         let wanted = json!({ "w": 640.0, "K": { "rows": 1.0, "dt": "d", "data": [1.0, 2.0, -0.3] } });
         assert_eq!(read(text).unwrap(), wanted);
-        for bad in ["<a><b></a></b>", "<a>", "<a", "</a>"] {
+        assert!(read("<a><_>1</_><_>2</_></a>").is_ok() && read("{\"a\": 1, \"a\": 2}").is_err());
+        for bad in ["<a><b></a></b>", "<a>", "<a", "</a>", "<a><b>1</b><b>2</b></a>"] {
             assert!(read(bad).is_err(), "{bad}");
         }
     }
