@@ -202,6 +202,47 @@ fn a_unit_in_a_comment_that_differs_is_named() {
 }
 
 #[test]
+fn more_points_than_the_header_counts_are_refused() {
+    let all = points();
+    for data in ["binary", "ascii"] {
+        let whole = pcd(&all, ("t", 8, "U", 1), HERE, data);
+        let text = String::from_utf8_lossy(&whole[..whole.len().min(400)]).into_owned();
+        let head = text.split_inclusive('\n').take_while(|l| !l.starts_with("DATA")).collect::<String>().len();
+        let less = String::from_utf8_lossy(&whole[..head]).replace("HEIGHT 30", "HEIGHT 25");
+        let less = less.replace("POINTS 1200", "POINTS 1000");
+        let fault = read_foreign(&[less.as_bytes(), &whole[head..]].concat()).unwrap_err();
+        assert!(fault.what.contains("1200 points or more, its header counts 1000"), "{data}: {fault}");
+        // An end of line behind the points is none.
+        assert!(read_foreign(&[&whole[..], b"\n"].concat()).is_ok(), "{data}");
+    }
+    let ply = |kind: &str, count: usize, xyz: &str, after: &str, body: &[u8]| {
+        let head = format!("ply\nformat {kind} 1.0\nelement vertex {count}\n{xyz}{after}end_header\n");
+        read_foreign(&[head.as_bytes(), body].concat()).map(drop).map_err(|fault| fault.what)
+    };
+    let xyz = "property float x\nproperty float y\nproperty float z\n";
+    let faces = "element face 2\nproperty list uchar int vertex_indices\n";
+    let text = "0 0 1\n1 0 1\n0 1 1\n1 1 1\n";
+    let list = "3 0 1 2\n3 1 2 3\n";
+    assert_eq!(ply("ascii", 4, xyz, "", text.as_bytes()), Ok(()));
+    assert_eq!(ply("ascii", 4, xyz, faces, format!("{text}{list}").as_bytes()), Ok(()));
+    for (count, after, body) in [(3, "", text.to_owned()), (2, faces, format!("{text}{list}"))] {
+        let said = ply("ascii", count, xyz, after, body.as_bytes()).unwrap_err();
+        assert!(said.contains("4 points or more"), "{said}");
+    }
+    let binary: Vec<u8> =
+        [0.0f32, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0, 1.0, 1.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+    let indices = [&[3u8][..], &[0; 12], &[3], &[0; 12]].concat();
+    assert_eq!(ply("binary_little_endian", 3, xyz, faces, &[&binary[..], &indices].concat()), Ok(()));
+    assert!(ply("binary_little_endian", 2, xyz, "", &binary).unwrap_err().contains("3 points or more"));
+    // Which of two fields of one name is meant is not known.
+    let twice = format!("{xyz}property float z\n");
+    assert!(ply("ascii", 1, &twice, "", b"0 0 1 2\n").unwrap_err().contains("2 of its fields are called z"));
+    let file = String::from_utf8(pcd(&all, ("t", 8, "U", 1), HERE, "ascii")).unwrap();
+    let fault = read_foreign(file.replace("COUNT 1 1 1 1", "COUNT 1 2 1 1").as_bytes()).unwrap_err();
+    assert!(fault.what.contains("field x has 2 numbers"), "{fault}");
+}
+
+#[test]
 fn options_that_do_nothing_to_a_cloud_are_refused() {
     let file = pcd(&points(), ("t", 8, "U", 1), HERE, "binary");
     let raw = read_foreign(&file).unwrap();

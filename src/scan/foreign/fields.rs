@@ -1,5 +1,7 @@
 //! Reads single fields out of the records of a binary or text file.
 
+use crate::fault::Fault;
+
 /// Number types of record fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Number {
@@ -57,14 +59,31 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
-    /// `None` if a coordinate is missing. An exact name is preferred; otherwise the case of letters is ignored.
-    pub fn among<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Option<Wanted> {
+    /// Refuses names without a coordinate, and one that is there twice. An exact name is preferred; otherwise the case
+    /// of letters is ignored.
+    pub fn among<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Result<Wanted, String> {
         let at = |name: &str| {
-            let any_case = || names.clone().position(|n| n.eq_ignore_ascii_case(name));
-            names.clone().position(|n| n == name).or_else(any_case)
+            let places = |same: &dyn Fn(&str) -> bool| -> Vec<usize> {
+                names.clone().enumerate().filter(|(_, n)| same(n)).map(|(k, _)| k).collect()
+            };
+            let exact = places(&|n| n == name);
+            let found = if exact.is_empty() { places(&|n| n.eq_ignore_ascii_case(name)) } else { exact };
+            match found[..] {
+                [] => Ok(None),
+                [k] => Ok(Some(k)),
+                _ => Err(format!("{} of its fields are called {name}", found.len())),
+            }
         };
-        Some(Wanted { xyz: [at("x")?, at("y")?, at("z")?], light: at("intensity") })
+        let needed = |name: &str| at(name)?.ok_or_else(|| "x, y or z is missing".to_owned());
+        Ok(Wanted { xyz: [needed("x")?, needed("y")?, needed("z")?], light: at("intensity")? })
     }
+}
+
+/// The error for a file that holds more points than its header counts.
+pub(super) fn surplus(there: usize, counted: usize) -> Fault {
+    Fault::input(format!("holds {there} points or more, its header counts {counted}"))
+        .cause("points were appended, or the header was copied from another file")
+        .next("correct the number in the header, or export the cloud again")
 }
 
 /// Points collected while records are read.
@@ -94,5 +113,19 @@ impl Points {
     pub fn intensity(self) -> (Vec<[f64; 3]>, Option<Vec<f32>>) {
         let known = !self.light.is_empty();
         (self.points, known.then_some(self.light))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_that_is_there_twice_is_refused() {
+        let among = |names: &[&'static str]| Wanted::among(names.iter().copied());
+        assert_eq!(among(&["_", "X", "x", "y", "Z", "_"]).unwrap().xyz, [2, 3, 4]);
+        assert!(among(&["x", "y", "z", "z"]).unwrap_err().contains("2 of its fields are called z"));
+        assert!(among(&["x", "y", "z", "Intensity", "INTENSITY"]).unwrap_err().contains("intensity"));
+        assert!(among(&["x", "y"]).unwrap_err().contains("missing"));
     }
 }

@@ -1,6 +1,6 @@
 //! Reads a PCD (Point Cloud Library): text, binary or compressed. Its points come in lines if it is organised.
 
-use super::fields::{Number, Points, Wanted};
+use super::fields::{Number, Points, Wanted, surplus};
 use super::raw::{MOST_POINTS, Raw, unit_in};
 use crate::fault::{Fault, Result};
 
@@ -39,11 +39,14 @@ struct Header {
 
 pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
     let (h, start) = header(bytes)?;
-    let wanted = Wanted::among(h.names.iter().map(String::as_str)).ok_or_else(|| strange("x, y or z is missing"))?;
+    let wanted = Wanted::among(h.names.iter().map(String::as_str)).map_err(strange)?;
     let body = &bytes[start..];
     let mut found = Points::default();
     if let Some(k) = wanted.xyz.into_iter().chain(wanted.light).find(|k| h.numbers[*k].is_none()) {
         return Err(strange(format!("its field {} is of {} bytes and no known type", h.names[k], h.sizes[k])));
+    }
+    if let Some(k) = wanted.xyz.into_iter().chain(wanted.light).find(|k| h.counts[*k] != 1) {
+        return Err(strange(format!("its field {} has {} numbers a point (COUNT)", h.names[k], h.counts[k])));
     }
     let number = |k: usize, bytes: &[u8]| h.numbers[k].map_or(f64::NAN, |n| n.read(bytes, false));
     let each: Vec<usize> = h.sizes.iter().zip(&h.counts).map(|(n, c)| n * c).collect();
@@ -66,9 +69,17 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
                     return Err(strange(format!("point {k} of {} is missing or no numbers", h.points)));
                 }
             }
+            let more = records.count();
+            if more > 0 {
+                return Err(surplus(h.points + more, h.points));
+            }
         }
         "binary" => {
             let offsets = starts(&each);
+            let more = body.len().saturating_sub(whole) / record;
+            if more > 0 {
+                return Err(surplus(h.points + more, h.points));
+            }
             let body = body.get(..whole).ok_or_else(|| strange(format!("it ends before its {} points", h.points)))?;
             for r in body.chunks_exact(record) {
                 found.take(&wanted, |k| number(k, &r[offsets[k]..]));

@@ -1,6 +1,6 @@
 //! Reads the vertices of a PLY of any program: text, or binary in either byte order.
 
-use super::fields::{Number, Points, Wanted};
+use super::fields::{Number, Points, Wanted, surplus};
 use super::raw::{MOST_POINTS, Raw, unit_in};
 use crate::fault::{Fault, Result};
 
@@ -56,6 +56,17 @@ impl Element {
         (at <= bytes.len()).then_some(at)
     }
 
+    /// Where the element's records end that begin at `at`; `None` if a list does not fit into the file.
+    fn end(&self, body: &[u8], mut at: usize, big_endian: bool, offsets: &mut Vec<usize>) -> Option<usize> {
+        if let Some(size) = self.size() {
+            return Some(at.saturating_add(self.count.saturating_mul(size)));
+        }
+        for _ in 0..self.count {
+            at += self.places(body.get(at..)?, big_endian, offsets)?;
+        }
+        Some(at)
+    }
+
     /// As [`Element::places`], for a record of words: the index of each property's first word.
     fn words(&self, words: &[&str], offsets: &mut Vec<usize>) -> Option<()> {
         offsets.clear();
@@ -82,8 +93,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
     let vertex = elements.iter().position(|e| e.name == "vertex").ok_or_else(|| strange("it has no vertices"))?;
     let before = &elements[..vertex];
     let e = &elements[vertex];
-    let wanted =
-        Wanted::among(e.properties.iter().map(|p| p.1.as_str())).ok_or_else(|| strange("x, y or z is missing"))?;
+    let after = &elements[vertex + 1..];
+    let wanted = Wanted::among(e.properties.iter().map(|p| p.1.as_str())).map_err(strange)?;
     let kinds: Vec<Option<Number>> =
         e.properties.iter().map(|p| if let Holds::One(n) = p.0 { Some(n) } else { None }).collect();
     if wanted.xyz.into_iter().chain(wanted.light).any(|k| kinds[k].is_none()) {
@@ -107,20 +118,16 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
                     return Err(strange(format!("vertex {k} of {} is missing or no numbers", e.count)));
                 }
             }
+            let more = records.count().saturating_sub(after.iter().map(|e| e.count).sum());
+            if more > 0 {
+                return Err(surplus(e.count + more, e.count));
+            }
         }
         Layout::Binary { big_endian } => {
             let ends = || strange(format!("it ends before its {} vertices", e.count));
             let mut at = 0usize;
             for b in before {
-                match b.size() {
-                    Some(size) => at = at.saturating_add(b.count.saturating_mul(size)),
-                    None => {
-                        for _ in 0..b.count {
-                            let rest = body.get(at..).ok_or_else(ends)?;
-                            at += b.places(rest, big_endian, &mut offsets).ok_or_else(ends)?;
-                        }
-                    }
-                }
+                at = b.end(body, at, big_endian, &mut offsets).ok_or_else(ends)?;
             }
             let size = e.size();
             if size.is_some_and(|size| at.saturating_add(e.count.saturating_mul(size)) > body.len()) {
@@ -136,6 +143,13 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
                     Some(size) => size,
                     None => e.places(record, big_endian, &mut offsets).ok_or_else(ends)?,
                 };
+            }
+            // What ends inside later elements, faces, still has all points.
+            let end = after.iter().try_fold(at, |at, e| e.end(body, at, big_endian, &mut offsets));
+            let least = e.size().unwrap_or(usize::MAX).max(1);
+            let more = end.map_or(0, |end| body.len().saturating_sub(end) / least);
+            if more > 0 {
+                return Err(surplus(e.count + more, e.count));
             }
         }
     }
