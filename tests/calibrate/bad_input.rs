@@ -138,6 +138,9 @@ fn a_wrong_board_is_told_by_its_size() {
     let c = Case::new("laserplane");
     c.meta(|m| m["boards"] = json!([{"type": "chessboard", "inner_corners": [7, 3], "square_mm": 8.0}]));
     c.fails("laser-plane", &["--on", "cpu"], &["board"]);
+    // Metres: a print of 0.08 mm.
+    c.meta(|m| m["boards"] = json!([{"type": "chessboard", "inner_corners": [7, 3], "square_mm": 0.01}]));
+    c.fails("laser-plane", &["--on", "cpu"], &["square_mm is 0.01", "at least 2 is accepted", "look like metres"]);
 }
 
 #[test]

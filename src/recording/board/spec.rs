@@ -176,7 +176,23 @@ impl BoardSpec {
                 refuse(format!("the board's first_square is '{colour}', 'black' or 'white' is allowed"))
             }
             _ => Ok(()),
+        }?;
+        self.not_metres(*border)
+    }
+
+    /// Refuses a board whose print is narrower than what imported lengths may be: it is described in metres.
+    fn not_metres(&self, border: f64) -> Result<()> {
+        let [left, top, right, bottom] = self.outline();
+        let across = (right - left).max(bottom - top) - 2.0 * border;
+        if across >= METRES {
+            return Ok(());
         }
+        let (key, length) = (self.length_key(), self.length_mm());
+        Err(Fault::input(format!(
+            "the board's {key} is {length}: its print would be {across:.4} mm across, at least {METRES} is accepted"
+        ))
+        .cause("the lengths look like metres")
+        .next("state the board's lengths in mm: multiply them by 1000"))
     }
 
     /// Whether the square at a ChArUco board's origin is white, and so contains a marker. A board that does not
@@ -361,6 +377,9 @@ impl BoardSpec {
         }
     }
 }
+
+/// Least width of a print, mm. Imported lengths below it are taken for metres as well.
+const METRES: f64 = 2.0;
 
 /// Distance of two rows of a hexagonal arrangement over the pitch: half the square root of 3.
 const ROWS: f64 = 0.866_025_403_784_438_6;
