@@ -130,6 +130,11 @@ fn ffmpeg_gives_the_frames_of_what_it_opens_and_its_errors_in_our_words() {
     assert!(all(open(&format!("ffmpeg:{video}")).unwrap(), 100).iter().eq(&pictures()));
     let deep = all(open("ffmpeg:-f lavfi -i testsrc2=size=64x48:rate=25:duration=0.2?bits=12").unwrap(), 100);
     assert_eq!((deep.len(), deep[0].bits, deep[0].width), (5, 12, 64));
+    // A file shorter than what a camera may have in flight gives its last picture.
+    let (one, shown) = (text(&dir.path().join("one.png")), text(&dir.path().join("shown.png")));
+    std::fs::write(&one, sheetlight::raster::png(&pictures()[0])).unwrap();
+    sheetlight(&["camera", "snap", &shown, "--camera", &format!("ffmpeg:-i {one}")]);
+    assert_eq!(sheetlight::raster::load(shown.as_ref(), Default::default(), 8).unwrap(), pictures()[0]);
     let fault = open("ffmpeg:-i /dev/none").err().unwrap();
     assert!(fault.what.contains("No such file") && fault.next.contains("ffmpeg"), "{fault}");
 }

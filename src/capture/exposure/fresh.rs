@@ -72,19 +72,26 @@ pub(super) struct Fresh<'a> {
     source: &'a mut dyn PictureSource,
     settling: Settling,
     patience: Duration,
+    /// The last picture that was not used. A file's pictures wait for their reader, so at its end the last one is as
+    /// good as any.
+    last: Option<Image>,
 }
 
 impl<'a> Fresh<'a> {
     /// The moment is now.
     pub fn now(source: &'a mut dyn PictureSource, patience: Duration) -> Fresh<'a> {
         let mut settling = Settling::begin(source, 0);
+        let mut last = None;
         while settling.drains() {
             match source.next(Duration::ZERO) {
-                Event::Picture(picture) => drop(settling.accepts(picture.device_ns)),
+                Event::Picture(picture) => {
+                    settling.accepts(picture.device_ns);
+                    last = Some(picture.image);
+                }
                 _ => settling.drained(),
             }
         }
-        Fresh { source, settling, patience }
+        Fresh { source, settling, patience, last }
     }
 
     /// The next of them.
@@ -97,13 +104,36 @@ impl<'a> Fresh<'a> {
             match self.source.next(Duration::from_millis(100)) {
                 Event::Picture(picture) if self.settling.accepts(picture.device_ns) => return Ok(picture.image),
                 Event::Lost(fault) => return Err(fault),
-                Event::Ended => break,
-                Event::Picture(_) | Event::Quiet | Event::Incomplete { .. } | Event::Spare { .. } => {}
+                Event::Ended => return self.ended(),
+                Event::Picture(picture) => self.last = Some(picture.image),
+                Event::Quiet | Event::Incomplete { .. } | Event::Spare { .. } => {}
             }
         }
-        Err(Fault::input(format!("{}: no picture within {:.0} s", self.source.name(), self.patience.as_secs_f64()))
-            .cause("it waits for a trigger, or its packets are lost (packet size, firewall)")
-            .next("see TriggerMode: sheetlight camera show; or try gige://...?packet=1500"))
+        let name = self.source.name();
+        let (cause, next) = if name.starts_with("gige:") {
+            (
+                "it waits for a trigger, or its packets are lost (packet size, firewall)",
+                "see TriggerMode: sheetlight camera show; or try gige://...?packet=1500",
+            )
+        } else {
+            (
+                "it sends nothing at present, or waits for a trigger",
+                "check with another program that pictures come, then run the command again",
+            )
+        };
+        Err(Fault::input(format!("{name}: no picture within {:.0} s", self.patience.as_secs_f64()))
+            .cause(cause)
+            .next(next))
+    }
+
+    /// The source has ended: its last picture, if its pictures wait for their reader.
+    fn ended(&mut self) -> Result<Image> {
+        let name = self.source.name();
+        self.last.take().filter(|_| self.source.waits()).ok_or_else(|| {
+            Fault::input(format!("{name}: ended before a picture came that was taken after the command began"))
+                .cause("a file without pictures, or a sender that stopped")
+                .next("give a source that goes on sending")
+        })
     }
 }
 
