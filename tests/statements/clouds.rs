@@ -243,6 +243,30 @@ fn more_points_than_the_header_counts_are_refused() {
 }
 
 #[test]
+fn files_of_other_formats_are_named_with_those_that_are_read() {
+    for (bytes, name) in [
+        (&b"Pf\n2 2\n-1.0\n\0\0\0\0"[..], "a PFM picture"),
+        (b"x,y,z\n0.5,1,2\n", "a table of numbers"),
+        (b"0.5 1 2e-3\n", "a table of numbers"),
+        (b"\x93NUMPY\x01\0", "NPY"),
+        (b"LASF\0\0", "a LAS or LAZ cloud"),
+        (b"PK\x03\x04", "a ZIP archive"),
+    ] {
+        let fault = read_foreign(bytes).unwrap_err();
+        assert!(fault.what.contains(name) && fault.cause.contains("clouds as PLY and PCD"), "{fault}");
+        assert!(!fault.to_string().contains("--skip-bad"), "{fault}");
+    }
+    assert!(read_foreign(b"P2\n2 1\n9\n3 4\n").is_ok());
+    let webp = sheetlight::raster::decode(b"RIFF\x20\0\0\0WEBPVP8L", Default::default(), 8).unwrap_err();
+    assert!(webp.what.contains("it is a WebP picture") && !webp.to_string().contains("--skip-bad"), "{webp}");
+    // The light's own size is named.
+    let light = read_foreign(b"P2\n3 1\n9\n3 4 5\n").unwrap();
+    let heights = read_foreign(b"P2\n2 1\n9\n3 4\n").unwrap();
+    let fault = lines(&heights, Some(&light), &stated(Some(None))).unwrap_err();
+    assert!(fault.what.contains("(--light) is 3x1, the heights are 2x1"), "{fault}");
+}
+
+#[test]
 fn options_that_do_nothing_to_a_cloud_are_refused() {
     let file = pcd(&points(), ("t", 8, "U", 1), HERE, "binary");
     let raw = read_foreign(&file).unwrap();

@@ -338,7 +338,7 @@ fn what_is_not_followed_is_named() {
         (page().short(262, 5), "CMYK"),
         (page().short(262, 6), "YCbCr"),
         (page().short(262, 8), "L*a*b*"),
-        (page().short(262, 32_803), "photometric interpretation"),
+        (page().short(262, 32_803), "32803, a raw mosaic"),
         (page().short(339, 5), "SampleFormat"),
         (page().short(258, 12), "BitsPerSample"),
         (page().short(339, 3), "SampleFormat"),

@@ -37,6 +37,19 @@ const FARTHEST_PX: f64 = 131_072.0;
 /// Most edge points of a level in a file, the upper limit of [`ModelOptions::max_points`].
 const MOST_PLACES: usize = 5000;
 
+/// Refuses a region (x, y, width, height) that is empty or leaves the picture.
+fn within([x, y, w, h]: [u32; 4], [width, height]: [u32; 2], of: &str) -> Result<()> {
+    let fits = |from: u32, length: u32, most: u32| length > 0 && u64::from(from) + u64::from(length) <= most.into();
+    if fits(x, w, width) && fits(y, h, height) {
+        return Ok(());
+    }
+    Err(Fault::usage(format!(
+        "the region {x},{y},{w},{h} (x,y,width,height) does not lie in the {of} of {width}x{height} px"
+    ))
+    .cause("the last two numbers are a corner instead of width and height, or the numbers are of another picture")
+    .next("give x,y of the top left pixel, width and height"))
+}
+
 impl Template {
     /// Learns what `region` shows (x, y, width, height; `None`: the whole picture). `source` is the picture's name and
     /// SHA-256.
@@ -68,6 +81,7 @@ impl Template {
         options: &ModelOptions,
     ) -> Result<Template> {
         let [x, y, w, h] = region.unwrap_or([0, 0, image.width, image.height]);
+        within([x, y, w, h], [image.width, image.height], "picture")?;
         let cells = cells([x, y, w, h]);
         let model = match hidden {
             None => ShapeModel::from_region(&Scene::from_image(image), cells, None, options)?,
@@ -107,6 +121,7 @@ impl Template {
         options: &ModelOptions,
     ) -> Result<Template> {
         let region_px = region.unwrap_or([0, 0, map.width, map.height]);
+        within(region_px, [map.width, map.height], "map")?;
         let model = ShapeModel::from_region(&Scene::from_heights(map)?, cells(region_px), None, options)?;
         let (picture, picture_sha256) = source;
         let mm_per_px = Some(map.cell);
@@ -236,6 +251,6 @@ mod tests {
         far.model.levels[0][0].x = 1e7;
         assert!(Template::parse(&serde_json::to_string(&far).unwrap()).unwrap_err().what.contains("an edge at"));
         let outside = Template::teach("box", &image, Some([8, 6, 60, 36]), source, &ModelOptions::default());
-        assert!(outside.unwrap_err().what.contains("does not lie in"));
+        assert!(outside.unwrap_err().what.contains("(x,y,width,height) does not lie in the picture of 64x48 px"));
     }
 }

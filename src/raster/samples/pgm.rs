@@ -39,7 +39,7 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     let broken = |what: String| {
         Err(Fault::input(what)
             .cause("the file is truncated, or its header is of another program")
-            .next("record the shot again, or pass --skip-bad to leave it out"))
+            .next("write the file again"))
     };
     let Some(Header { width, height, most, start }) = header(bytes) else {
         return broken(format!("is not a readable picture ({} bytes): a PGM without a whole header", bytes.len()));

@@ -6,6 +6,7 @@ use super::turn::{self, Orientation};
 use crate::fault::{Fault, Result};
 use crate::raster::Mask;
 use crate::raster::budget::Budget;
+use crate::raster::named::other_format;
 use crate::raster::size::fits;
 
 /// The samples of one picture, upright.
@@ -123,7 +124,13 @@ impl Samples {
 
 /// The error for a picture that no reader can read.
 pub(super) fn unreadable(bytes: &[u8], e: &dyn std::fmt::Display) -> Fault {
-    Fault::input(format!("is not a readable picture ({} bytes): {e}", bytes.len()))
-        .cause("the file is truncated, empty, or of a format other than PNG, JPEG, TIFF, BMP and PGM")
-        .next("write the file again; a scan leaves a bad shot out with --skip-bad")
+    let what = |why: &dyn std::fmt::Display| format!("is not a readable picture ({} bytes): {why}", bytes.len());
+    match other_format(bytes) {
+        Some(name) => Fault::input(what(&format!("it is {name}")))
+            .cause("pictures are read as PNG, JPEG, TIFF, BMP and PGM")
+            .next("save it in one of these formats"),
+        None => Fault::input(what(e))
+            .cause("the file is truncated, empty, or of a format other than PNG, JPEG, TIFF, BMP and PGM")
+            .next("write the file again"),
+    }
 }

@@ -40,11 +40,34 @@ fn beginning_at(bytes: &[u8], directory: u64) -> Vec<u8> {
 }
 
 fn open(bytes: &[u8], page: usize) -> Result<Decoder<Cursor<&[u8]>>> {
-    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(|e| strange(&e))?;
+    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(|e| mosaic(bytes).unwrap_or_else(|| strange(&e)))?;
     if page > 0 {
         decoder.seek_to_image(page).map_err(|e| strange(&e))?;
     }
     Ok(decoder)
+}
+
+/// The error for colours that the `tiff` crate does not know: a sensor's raw data.
+fn mosaic(bytes: &[u8]) -> Option<Fault> {
+    let big_endian = bytes.starts_with(b"MM");
+    let take = |at: usize, length: usize| -> Option<u64> {
+        let b = bytes.get(at..at + length)?;
+        let add = |n: u64, v: &u8| n << 8 | u64::from(*v);
+        Some(if big_endian { b.iter().fold(0, add) } else { b.iter().rev().fold(0, add) })
+    };
+    let first = if take(2, 2)? == 43 { take(8, 8)? } else { take(4, 4)? };
+    let place = value_of_tag(bytes, usize::try_from(first).ok()?, big_endian)?;
+    let name = match take(*place.first()?, 2)? {
+        32_803 => "32803, a raw mosaic of colour filters",
+        34_892 => "34892, raw colours of a sensor (LinearRaw)",
+        32_844 | 32_845 => "32844 or 32845, logarithms of light (LogLuv)",
+        _ => return None,
+    };
+    Some(
+        Fault::input(format!("has colours of kind {name} (PhotometricInterpretation, tag 262)"))
+            .cause("a camera's raw data, whose neighbouring pixels need not have the same colour")
+            .next("develop it with the camera's program, and save it as grey or as red, green and blue"),
+    )
 }
 
 pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {

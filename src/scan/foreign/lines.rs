@@ -180,13 +180,15 @@ fn said(says: &Says, [dx, dy]: [f64; 2], stated: &Stated, notes: &mut Vec<String
 
 /// The levels of an intensity picture: larger is brighter, 0 where the intensity is unknown.
 fn brightness(light: &Raw, [width, height]: [usize; 2], notes: &mut Vec<String>) -> Result<Vec<f32>> {
+    let another = |is: String| {
+        Err(Fault::input(format!("the picture of the light (--light) is {is}, the heights are {width}x{height}"))
+            .cause("it belongs to another map")
+            .next("give the picture that was taken with the heights"))
+    };
     let (levels, kind, says) = match light {
         Raw::Picture { width: w, height: h, levels, kind, says } if (*w, *h) == (width, height) => (levels, kind, says),
-        _ => {
-            return Err(Fault::input(format!("the picture of the light is not one of {width}x{height} pixels"))
-                .cause("it belongs to another map")
-                .next("give the picture that was taken with the heights"));
-        }
+        Raw::Picture { width, height, .. } => return another(format!("{width}x{height}")),
+        Raw::Points { .. } => return another("a cloud".into()),
     };
     let most = match (says.white_is_zero, kind.most()) {
         (false, _) => None,
