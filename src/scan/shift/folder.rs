@@ -66,8 +66,8 @@ pub fn gaps(names: &[PathBuf], travel_mm: f64) -> Option<String> {
     let (pair, _) = wide.first()?;
     let missing: u128 = wide.iter().map(|(_, n)| n / usual - 1).sum();
     Some(format!(
-        "the numbers of the pictures have gaps: {missing} are missing, the first between {} and {}; each picture \
-         counts as one step of {travel_mm} mm, so put in what is missing if the bed moved on",
+        "the numbers of the pictures have gaps: {missing} are missing, the first between {} and {}. Each picture \
+         counts as one step of {travel_mm} mm, so add what is missing if the bed moved on",
         name(&pair[0]),
         name(&pair[1])
     ))

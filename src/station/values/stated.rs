@@ -140,7 +140,8 @@ mod tests {
             (json!({ "tool_T_camera": [1] }), "tool_T_camera"),
             (json!({ "transform": "camera_T_flange" }), "camera_T_flange"),
         ] {
-            assert!(said(more.clone()).contains(wanted), "{more}: {}", said(more));
+            let what = said(more);
+            assert!(what.contains(wanted), "{wanted}: {what}");
         }
         // Pixels have no length.
         let camera = json!({ "units": "m", "intrinsics": {} });
