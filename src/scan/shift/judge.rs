@@ -109,7 +109,7 @@ mod tests {
         assert!(judge(&turned).unwrap_err().what.contains("turned by 180 degrees it would"));
         let moved = lines(|i, (u, s)| if odd(i) { (u + 15.0, s) } else { (u, s) });
         let said = judge(&moved).unwrap().unwrap();
-        assert!(said.contains("3 pictures") && said.contains("15 px") && said.contains("f7.png"), "{said}");
+        assert!(said.contains("3 pictures") && said.contains("the first is f7.png"), "{said}");
     }
 
     #[test]
