@@ -118,6 +118,33 @@ fn pictures_without_a_board_are_named_with_the_reason() {
     c.fails("hand-eye", &NOISY, &["16 pictures", "ambient_0000.png", "grey levels span"]);
 }
 
+/// All laser pictures, or half of them, are turned or mirrored against their ambient pictures.
+#[test]
+fn laser_pictures_turned_against_their_ambient_ones_are_named() {
+    for (half, columns, rows, wanted) in [
+        (false, true, true, "the laser pictures are turned by 180 degrees against the ambient pictures"),
+        (false, false, true, "the laser pictures are mirrored top to bottom against the ambient pictures"),
+        (true, true, true, "laser pictures are turned by 180 degrees against the ambient pictures"),
+    ] {
+        let c = Case::new("laserplane");
+        let meta = std::fs::read_to_string(c.recording.join("meta.json")).unwrap();
+        let meta: Value = serde_json::from_str(&meta).unwrap();
+        let names = meta["frames"].as_array().unwrap().iter().map(|f| f["laser"].as_str().unwrap());
+        for name in names.enumerate().filter(|(i, _)| !half || i % 2 == 1).map(|(_, name)| name) {
+            let image = load(&c.recording.join(name), Channel::Luma, 8).unwrap();
+            let mut lines: Vec<Vec<u8>> = image.to_u8().chunks(image.width as usize).map(<[u8]>::to_vec).collect();
+            if columns {
+                lines.iter_mut().for_each(|line| line.reverse());
+            }
+            if rows {
+                lines.reverse();
+            }
+            c.overwrite(name, &Image::from_u8(image.width, image.height, lines.concat()));
+        }
+        c.fails("laser-plane", &["--on", "cpu"], &[wanted, "agree on one laser plane"]);
+    }
+}
+
 #[test]
 fn a_wrong_board_is_told_by_its_size() {
     let c = Case::new("intrinsics");

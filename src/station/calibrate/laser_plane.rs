@@ -6,6 +6,7 @@ use super::board_views::{Boards, FrameBoard, boards, unchecked_size};
 use super::hand_eye::{Calibrated, first_line};
 use super::room_light::{self, lit};
 use super::straight::keep_straight;
+use super::turned_light::{Flip, turned_against_ambient};
 use crate::calibrate::laser_plane::options::LaserPlaneOptions;
 use crate::calibrate::laser_plane::report::{covariance, judge, page};
 use crate::calibrate::laser_plane::solve::{LaserPlaneFit, solve};
@@ -66,8 +67,19 @@ pub fn calibrate_laser_plane(
             .next("record an ambient and a laser picture of each board pose"));
     }
     let c = intrinsic_covariance(&camera.covariance)?;
-    let (views, fit) = sheet_on_boards(&seen, &images, &camera.value, &c, run)
-        .map_err(|fault| lit(recording, &names[names.len() / 2], fault))?;
+    let fit = |images: &[Image]| sheet_on_boards(&seen, images, &camera.value, &c, run);
+    let turned = |flip: Flip| -> Result<Vec<Image>> {
+        let one = |(name, b): (&String, &FrameBoard)| {
+            let laser = flip.of(&recording.picture(name)?);
+            Ok(room_light::alone(laser, &recording.picture(&b.pose.name)?, b, &camera.value))
+        };
+        names.iter().zip(&seen).map(one).collect()
+    };
+    let found = fit(&images);
+    if let Some(fault) = turned_against_ambient(&images, &found, &turned, &fit)? {
+        return Err(fault);
+    }
+    let (views, fit) = found.map_err(|fault| lit(recording, &names[names.len() / 2], fault))?;
     let lit = Volume::new(fit.reach[0], fit.reach[1], "where the boards were lit");
     let limits = run.asked.limits(&lit, |z| camera.value.view_mm(z));
     let mut quality = judge(&fit, &views, &camera.value, &limits);

@@ -14,3 +14,4 @@ mod profile_report;
 pub(super) mod profile_sensor;
 mod room_light;
 mod straight;
+mod turned_light;
