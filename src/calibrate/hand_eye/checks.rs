@@ -7,6 +7,7 @@ use super::closed::{Pair, axis_spread};
 use super::fit::HandEyeFit;
 use super::options::{HandEyeOptions, Mount};
 use super::otherwise;
+use crate::calibrate::limits::rms;
 use crate::fault::{Fault, Result};
 
 /// Robot poses closer than this count as the same pose: 1 µm and 0.001 degrees.
@@ -45,11 +46,12 @@ pub fn before(pairs: &[Pair], mount: Mount, o: &HandEyeOptions) -> Result<()> {
             .cause("the robot did not move between the pictures, or a pose was copied")
             .next("take one picture of each such pair out of the recording"));
     }
+    otherwise::both_in_metres(pairs, o)?;
     let spread = axis_spread(&pairs.iter().collect::<Vec<_>>());
     let [first, second, _] = spread.map(|s| s.1.to_degrees());
     if second < o.min_second_axis_deg {
         // Angles read in a wrong unit look like a robot that hardly rotates.
-        if let Some(e) = otherwise::find(pairs, mount, false, 0, o).filter(|e| e.refuses) {
+        if let Some(e) = otherwise::find(pairs, mount, false, false, o).filter(|e| e.refuses) {
             return Err(e.fault("the poses turn about one axis only".into()));
         }
         let axis = spread[0].0;
@@ -68,6 +70,9 @@ pub fn before(pairs: &[Pair], mount: Mount, o: &HandEyeOptions) -> Result<()> {
     Ok(())
 }
 
+/// From this rms misfit of a fit on, mm, one part of its pairs may differ from the rest. A robot that is less accurate
+/// than its kind stays below it, and by itself it is no fault: the part must also explain the misfit.
+const PARTS_MM: f64 = 1.0;
 /// Below this ratio to chance, no other order of the poses is tried.
 const SURELY: f64 = 0.02;
 
@@ -90,8 +95,18 @@ pub fn after(pairs: &[Pair], fit: &HandEyeFit, mount: Mount, o: &HandEyeOptions)
     if chance > BY_CHANCE || used * 10 < pairs.len() * 6 || used < o.min_pairs {
         return Err(otherwise::explain(pairs, what, mount, o));
     }
-    match otherwise::find(pairs, mount, chance > SURELY, pairs.len() - used, o) {
+    let rms = rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.mm));
+    let parts_too = pairs.len() - used > 1 || rms > PARTS_MM;
+    match otherwise::find(pairs, mount, chance > SURELY, parts_too, o) {
         Some(e) if e.refuses => Err(e.fault(what)),
+        // The fit is wrong too if it took in most of the part that differs.
+        Some(e) if 2 * e.part.iter().filter(|&&i| fit.pairs[i].used).count() > e.part.len() => {
+            let what = format!(
+                "robot poses and pictures disagree by {rms:.2} mm rms, and by {:.3} mm with one part of them changed",
+                e.fits.then
+            );
+            Err(e.fault(what))
+        }
         other => Ok(other.map(|e| e.cause)),
     }
 }

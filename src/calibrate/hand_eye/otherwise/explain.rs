@@ -10,16 +10,17 @@ use crate::fault::Fault;
 /// Explanations that fit this many times worse than the best one are not reported.
 const WORSE: f64 = 1.5;
 
-/// A change that would make the pairs fit much better. `order_too`: whether the pairing may be wrong. `left_out`:
-/// number of pairs that disagree with the others.
-pub fn find(pairs: &[Pair], mount: Mount, order_too: bool, left_out: usize, o: &HandEyeOptions) -> Option<Explanation> {
+/// A change that would make the pairs fit much better. `order_too`: whether the pairing may be wrong. `parts_too`:
+/// whether one part of the pairs may differ from the rest.
+pub fn find(pairs: &[Pair], mount: Mount, order_too: bool, parts_too: bool, o: &HandEyeOptions) -> Option<Explanation> {
     let now = Present { pairs, seed: o.seed };
     let mut all: Vec<Explanation> = lengths::explain(&now, o).into_iter().collect();
     all.extend(readings::explain(&now, mount));
     if order_too {
         all.extend(order::explain(&now));
     }
-    if left_out > 1 {
+    if parts_too {
+        all.extend(lengths::in_one_part(&now));
         all.extend(parts::explain(&now, mount));
     }
     let best = all.iter().map(|e| e.fits.then).fold(f64::INFINITY, f64::min);
@@ -29,7 +30,7 @@ pub fn find(pairs: &[Pair], mount: Mount, order_too: bool, left_out: usize, o: &
 
 /// For pairs on which no fit succeeded: the reason, if one is found.
 pub fn explain(pairs: &[Pair], what: String, mount: Mount, o: &HandEyeOptions) -> Fault {
-    match find(pairs, mount, true, pairs.len(), o) {
+    match find(pairs, mount, true, true, o) {
         Some(e) => e.fault(what),
         None => Fault::input(what)
             .cause("poses and pictures mispaired, a board that was moved, or another hand-eye mount than stated")

@@ -17,6 +17,8 @@ pub struct Explanation {
     pub changes: u32,
     /// True if the fault makes the transform wrong, rather than only excluding some pairs.
     pub refuses: bool,
+    /// Indices of the pairs that are changed, if they are a part of all.
+    pub part: Vec<usize>,
 }
 
 impl Explanation {

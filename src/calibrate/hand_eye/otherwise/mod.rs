@@ -13,3 +13,4 @@ mod readings;
 
 pub use explain::{explain, find};
 pub use explanation::Explanation;
+pub use lengths::both_in_metres;

@@ -27,5 +27,6 @@ pub fn explain(now: &Present<'_>) -> Option<Explanation> {
         fits,
         changes: 1,
         refuses: true,
+        part: Vec::new(),
     })
 }

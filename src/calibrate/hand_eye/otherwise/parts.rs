@@ -181,7 +181,7 @@ fn turned(pairs: &[Pair], rest: &[usize], boards: &[Rigid<Board, Board>]) -> Opt
 }
 
 /// Names of the given pairs, such as `pose 7 to pose 13`.
-fn names(pairs: &[Pair], which: &[usize]) -> String {
+pub fn names(pairs: &[Pair], which: &[usize]) -> String {
     const MOST_NAMES: usize = 6;
     let name = |i: usize| pairs[i].seen.name.as_str();
     let (first, last) = (which[0], which[which.len() - 1]);
@@ -257,7 +257,7 @@ impl Constant {
                 )
             }
         };
-        Explanation { what: String::new(), cause, next, fits, changes, refuses }
+        Explanation { what: String::new(), cause, next, fits, changes, refuses, part: part.clone() }
     }
 }
 

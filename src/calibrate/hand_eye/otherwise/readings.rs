@@ -329,5 +329,6 @@ pub fn explain(now: &Present<'_>, mount: Mount) -> Option<Explanation> {
         fits,
         changes: notation.changes(&as_read).max(1),
         refuses: true,
+        part: Vec::new(),
     })
 }
