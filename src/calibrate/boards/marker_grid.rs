@@ -2,6 +2,7 @@
 //! visible markers with their ids, or the reason why no marker was found.
 //! Frame and unit: pixels; four ids per marker, clockwise from its upper left corner, markers row by row.
 
+use super::described::{Marker, contradicts};
 use super::mask::{DARK, mask};
 use super::quads::{QuadCorner, quads, refined};
 use super::refine::{Grey, Window, corner};
@@ -28,30 +29,68 @@ struct Seen {
     corners: [QuadCorner; 4],
 }
 
+/// A marker of the board's dictionary, whether or not the board has it.
+struct Read {
+    id: usize,
+    corners: [QuadCorner; 4],
+}
+
+impl Read {
+    fn marker(&self) -> Marker {
+        Marker { id: self.id, corners: self.corners.map(|c| c.pixel) }
+    }
+}
+
+struct Looked {
+    seen: Vec<Read>,
+    /// Number of dark quadrilaterals.
+    patches: usize,
+}
+
+/// The markers of the dictionary in a picture; one may be there twice.
+pub fn readable(grey: &Grey, board: &BoardSpec, markers: &Markers, options: &FindOptions) -> Vec<Marker> {
+    read_all(grey, board, markers, options).seen.iter().map(Read::marker).collect()
+}
+
+/// The markers of the dictionary; several shares and sizes may read one twice.
+fn read_all(grey: &Grey, board: &BoardSpec, markers: &Markers, options: &FindOptions) -> Looked {
+    let matcher = Matcher::new(markers.dictionary(), markers.dictionary().max_correction_bits().min(2));
+    let has = |id: usize| markers.places().any(|(_, _, k)| k == id);
+    let first = (grey.width.max(grey.height) / options.detector_px).max(1);
+    let mut looked = Looked { seen: Vec::new(), patches: 0 };
+    for shrink in if first > 1 { vec![first, 1] } else { vec![1] } {
+        let small = grey.shrunk(shrink);
+        let shares = if board.corner_squares_mm().is_some() { &TOUCHING[..] } else { &TOUCHING[..1] };
+        let masks = shares.iter().map(|share| mask(&small, true, *share));
+        let found: Vec<[Vec2; 4]> = masks.flat_map(|m| quads(&m, small.width, small.height)).collect();
+        looked.patches += found.len();
+        let full = |p: &Vec2| p.map(|c| (c + 0.5) * shrink as f64 - 0.5);
+        for quad in found {
+            let quad = quad.each_ref().map(full);
+            looked.seen.extend(read(grey, &quad, markers, &matcher));
+        }
+        if looked.seen.iter().any(|r| has(r.id)) {
+            break;
+        }
+    }
+    looked
+}
+
 /// Finds the markers of a board; any number of them may be in view.
 pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<BoardView> {
     let markers = Markers::of(board)?
         .ok_or_else(|| Fault::usage("the board has no markers").next("describe it as type marker_grid"))?;
     let grey = Grey::new(image);
-    let matcher = Matcher::new(markers.dictionary(), markers.dictionary().max_correction_bits().min(2));
-    let shrink = (grey.width.max(grey.height) / options.detector_px).max(1);
-    let mut seen: Vec<Seen> = Vec::new();
-    let mut patches = 0;
-    for shrink in if shrink > 1 { vec![shrink, 1] } else { vec![1] } {
-        let small = grey.shrunk(shrink);
-        let shares = if board.corner_squares_mm().is_some() { &TOUCHING[..] } else { &TOUCHING[..1] };
-        let masks = shares.iter().map(|share| mask(&small, true, *share));
-        let found: Vec<[Vec2; 4]> = masks.flat_map(|m| quads(&m, small.width, small.height)).collect();
-        patches += found.len();
-        let full = |p: &Vec2| p.map(|c| (c + 0.5) * shrink as f64 - 0.5);
-        for quad in found {
-            let quad = quad.each_ref().map(full);
-            seen.extend(read(&grey, &quad, &markers, &matcher));
-        }
-        if !seen.is_empty() {
-            break;
-        }
+    let Looked { seen: all, patches } = read_all(&grey, board, &markers, options);
+    let as_read: Vec<Marker> = all.iter().map(Read::marker).collect();
+    if let Some(fault) = contradicts(board, &markers, &as_read) {
+        return Err(fault);
     }
+    let placed = |r: Read| {
+        let place = markers.places().position(|(_, _, id)| id == r.id)?;
+        Some(Seen { place, corners: r.corners })
+    };
+    let mut seen: Vec<Seen> = all.into_iter().filter_map(placed).collect();
     let features = board.features();
     keep_agreeing(&mut seen, &features.iter().map(|f| f.xy()).collect::<Vec<_>>());
     if let Some(side) = board.corner_squares_mm() {
@@ -75,8 +114,8 @@ pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<B
     Ok(BoardView { points, ..BoardView::default() })
 }
 
-/// Decodes the marker in a quadrilateral; `None` if it is not one of the board's.
-fn read(grey: &Grey, quad: &[Vec2; 4], markers: &Markers, matcher: &Matcher) -> Option<Seen> {
+/// Decodes the marker in a quadrilateral; `None` if it is not one of the dictionary's.
+fn read(grey: &Grey, quad: &[Vec2; 4], markers: &Markers, matcher: &Matcher) -> Option<Read> {
     let cells = markers.cells();
     let n = cells as f64;
     let ring = markers.ring();
@@ -98,11 +137,10 @@ fn read(grey: &Grey, quad: &[Vec2; 4], markers: &Markers, matcher: &Matcher) -> 
     let bits = (0..levels.len()).filter(|k| !ring(*k));
     let code = bits.enumerate().fold(0u64, |code, (bit, k)| code | u64::from(black(k)) << bit);
     let found = matcher.match_code(code)?;
-    let place = markers.places().position(|(_, _, id)| id == found.id as usize)?;
     // The marker appears rotated clockwise by `rotation` quarter turns; its upper left corner is shifted by as many
     // indices.
     let turn = found.rotation as usize + markers.turn();
-    Some(Seen { place, corners: std::array::from_fn(|k| corners[(k + turn) % 4]) })
+    Some(Read { id: found.id as usize, corners: std::array::from_fn(|k| corners[(k + turn) % 4]) })
 }
 
 /// Replaces a marker's corners by fits of the crossing edges, where a black square touches the corner. Printing and

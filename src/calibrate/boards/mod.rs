@@ -2,6 +2,7 @@
 //! Frame and unit: pixels (centres at integers); feature ids index `BoardSpec::features()`.
 
 mod chess;
+mod described;
 mod dots;
 pub mod extent;
 mod marker_grid;

@@ -88,11 +88,14 @@ fn parameters(result: &CameraResult) -> String {
         text += &format!("\n  {name:9} {value:12.6} +- {:.6}", c.covariance.sigma(name).unwrap_or(f64::NAN));
     }
     let figure = |name: &str| c.quality.figures.get(name).copied().unwrap_or(f64::NAN);
-    text += &format!(
-        "\nexpected error of the viewing rays where boards were seen {:.4} px, {:.4} mm at {:.0} mm",
-        figure("expected_ray_error_where_seen_px"),
-        figure("expected_error_at_working_distance_mm"),
-        figure("working_distance_mm"),
-    );
+    let px = figure("expected_ray_error_where_seen_px");
+    let mm = figure("expected_error_at_working_distance_mm");
+    text += &match px.is_finite() && mm.is_finite() {
+        true => format!(
+            "\nexpected error of the viewing rays where boards were seen {px:.4} px, {mm:.4} mm at {:.0} mm",
+            figure("working_distance_mm"),
+        ),
+        false => "\nexpected error of the viewing rays: unknown, the pictures do not determine all parameters".into(),
+    };
     text
 }

@@ -4,12 +4,14 @@
 use super::first_square::Turned;
 use super::grid::{FrontEnd, Grid, Prepared};
 use super::growth::grown;
+use crate::calibrate::boards::described::contradicts;
+use crate::calibrate::boards::marker_grid::readable;
 use crate::calibrate::boards::refine::{Grey, Window};
 use crate::calibrate::boards::{BoardPoint, BoardView, FindOptions};
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
 use crate::raster::Image;
-use crate::recording::BoardSpec;
+use crate::recording::{BoardSpec, Markers};
 use calib_targets_charuco::{CharucoBoardSpec, CharucoDetector, CharucoParams, MarkerLayout};
 
 /// Smallest number of corners in an accepted view: a pose needs 6, and some redundancy.
@@ -50,7 +52,7 @@ pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<B
     };
     match chosen {
         Some(sight) if sight.view.points.len() >= FEWEST => Ok(sight.view),
-        Some(sight) => Err(why_not(&layout, sight.span, &sight.reason)),
+        Some(sight) => Err(why_not(&layout, &sight, board, &grey, options)),
         None => Err(Fault::input(format!(
             "a ChArUco board of {}x{} squares that begins with a white one is not found",
             squares[0], squares[1]
@@ -183,21 +185,34 @@ fn refine(grid: &mut Grid, layout: &Layout, grey: &Grey, options: &FindOptions) 
     BoardView { points, ..BoardView::default() }
 }
 
-fn why_not(layout: &Layout, span: f64, reason: &str) -> Fault {
+fn why_not(layout: &Layout, sight: &Sight, board: &BoardSpec, grey: &Grey, options: &FindOptions) -> Fault {
     let [c, r] = layout.squares;
     let wanted = format!("fewer than {FEWEST} corners of the {c}x{r} ChArUco board were found");
-    if span < 0.06 {
+    if sight.span < 0.06 {
         return Fault::refused(format!(
             "{wanted}: grey levels span {:.1} % of full scale, 6 % are needed",
-            span * 100.0
+            sight.span * 100.0
         ))
         .cause("too dark, too bright, or the lens is covered")
         .next("adjust the exposure so that white squares reach half of full scale");
     }
+    // The detector reads only markers where this board has them, so the picture is searched for any marker.
+    let markers = Markers::of(board).ok().flatten();
+    let read = markers.as_ref().map(|m| readable(grey, board, m, options)).unwrap_or_default();
+    if let Some(other) = markers.and_then(|m| contradicts(board, &m, &read)) {
+        return Fault::refused(format!("{wanted}: {}", other.what)).cause(other.cause).next(other.next);
+    }
+    let reason = match read.len() {
+        0 => sight.reason.clone(),
+        _ => "markers of the dictionary were read".into(),
+    };
+    let cause = if read.is_empty() {
+        "the board is out of view or out of focus, its markers are smaller than 15 px, or the description \
+            names another dictionary or size"
+    } else {
+        "most of the board is out of view, out of focus or covered, or the description names another size"
+    };
     Fault::refused(if reason.is_empty() { wanted } else { format!("{wanted} ({reason})") })
-        .cause(
-            "the board is out of view or out of focus, its markers are smaller than 15 px, or the description \
-                names another dictionary or size",
-        )
+        .cause(cause)
         .next("look at the picture and compare the printed board with its description")
 }

@@ -252,6 +252,52 @@ fn markers_of_every_dictionary_are_read_where_they_are_from_every_side() {
     println!("corners of markers off by {worst_of_all:.3} px at most");
 }
 
+/// Boards whose description has columns and rows swapped, another number of them, another first id or other sizes: the
+/// markers that are read tell it.
+#[test]
+fn another_order_of_markers_is_told() {
+    let with = |mut board: BoardSpec, change: &dyn Fn(&mut BoardSpec)| {
+        change(&mut board);
+        board
+    };
+    let squares = |to: [u32; 2]| {
+        with(charuco(), &|b| {
+            if let BoardSpec::Charuco { squares, .. } = b {
+                *squares = to;
+            }
+        })
+    };
+    let small = with(charuco(), &|b| {
+        if let BoardSpec::Charuco { marker_mm, .. } = b {
+            *marker_mm = 7.0;
+        }
+    });
+    let grid = markers([6, 5], "DICT_APRILTAG_36h11", 0);
+    let wide = with(grid.clone(), &|b| {
+        if let BoardSpec::MarkerGrid { gap_mm, .. } = b {
+            *gap_mm = 11.0;
+        }
+    });
+    let printed_charuco = picture(&charuco(), &facing(&charuco(), Vec3::new(0.3, -0.2, 0.2), 230.0));
+    let printed_grid = picture(&grid, &facing(&grid, Vec3::new(0.3, -0.2, 0.2), 330.0));
+    for (image, stated, wanted) in [
+        (&printed_charuco, squares([6, 9]), "state \"squares\": [9, 6]"),
+        (&printed_charuco, squares([8, 6]), "a board with 9 columns, the described one has 8"),
+        (&printed_charuco, squares([10, 6]), "a board with 9 columns, the described one has 10"),
+        (&printed_charuco, small, "wrong marker or gap size given"),
+        (&printed_grid, markers([5, 6], "DICT_APRILTAG_36h11", 0), "state \"markers\": [6, 5]"),
+        (&printed_grid, markers([6, 5], "DICT_APRILTAG_36h11", 3), "rows begin with id 0, 6, 12"),
+        (&printed_grid, wide, "gap_mm is about 5."),
+    ] {
+        let said = match find(image, &stated, &FindOptions::default()) {
+            Ok(view) => format!("found with {} points", view.points.len()),
+            Err(fault) => fault.to_string(),
+        };
+        assert!(said.contains(wanted), "{stated:?}: {said}");
+        assert!(!said.contains("no markers decoded"), "{said}");
+    }
+}
+
 /// Every id is read in a clean view: each code changes the shape of the patch that is searched for.
 #[test]
 fn no_id_of_any_dictionary_is_unreadable() {
