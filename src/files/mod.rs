@@ -31,7 +31,7 @@ pub use moment::moment;
 pub use natural::natural;
 pub use read::{length, read, read_text, read_text_if_there};
 pub use slip::{named, slip_at, slip_in};
-pub use table::{TableRow, table};
+pub use table::{TableRow, stated, table};
 pub use together::Together;
 pub use workplace::Workplace;
 pub use yaml::{parse as yaml, scalar as yaml_scalar};

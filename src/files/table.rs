@@ -1,5 +1,5 @@
 //! In: the text of a table: one row per line; cells separated by a character or by white space, quoted or not;
-//! comments after `#`. Out: its rows with their line numbers.
+//! comments after `#`. Out: its rows with their line numbers, and what comments state.
 //! Frame and unit: none; cells are text.
 
 /// A row of a table.
@@ -21,6 +21,15 @@ pub fn table(text: &str, separator: char) -> Vec<TableRow> {
     rows.map(|(line, l)| TableRow { line, text: l.to_owned(), cells: cells(l, separator) }).collect()
 }
 
+/// The values that a table's comments state for any of these keys, which are in lower case: `# unit: mm`,
+/// `# Unit = mm`.
+pub fn stated<'a>(text: &'a str, keys: &[&str]) -> Vec<&'a str> {
+    let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim).filter(|l| l.starts_with('#'));
+    let statements = lines.filter_map(|l| l.trim_start_matches('#').split_once([':', '=']));
+    let of_key = statements.filter(|(key, _)| keys.contains(&key.trim().to_lowercase().as_str()));
+    of_key.map(|(_, value)| value.trim()).collect()
+}
+
 fn cells(line: &str, separator: char) -> Vec<String> {
     if separator == ' ' {
         return line.split_whitespace().map(str::to_owned).collect();
@@ -40,6 +49,13 @@ fn cells(line: &str, separator: char) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn comments_state_values_wherever_they_stand() {
+        let text = "\u{feff}# Unit = mm\n#made: today\na,b\n ## units:  \u{b5}m \r\n1,2\n# unit\n";
+        assert_eq!(stated(text, &["unit", "units"]), ["mm", "\u{b5}m"]);
+        assert!(stated("unit: mm\n", &["unit"]).is_empty());
+    }
 
     #[test]
     fn cells_are_the_same_however_a_program_writes_them() {

@@ -4,6 +4,7 @@
 use super::pose_csv;
 use super::poses::json_rows;
 use crate::fault::{Fault, Result};
+use crate::files::stated;
 use crate::geometry::{Board, Camera, Rigid};
 use std::path::Path;
 
@@ -21,23 +22,27 @@ pub fn load_board_poses(path: &Path) -> Result<Vec<(usize, Rigid<Camera, Board>)
     read(&text, json).map_err(|e| e.at(path.display()))
 }
 
+fn check_transform(text: &str) -> Result<()> {
+    let values = stated(text, &["transform"]);
+    let other = values.iter().find(|value| **value != TRANSFORM);
+    if other.is_none() && !values.is_empty() {
+        return pose_csv::check_statements(text, &[TRANSFORM]);
+    }
+    Err(Fault::input(match other {
+        Some(other) => format!("transform is '{other}', only '{TRANSFORM}' is read"),
+        None => "does not say what its poses are".into(),
+    })
+    .cause("a board's pose may be written as camera_T_board or board_T_camera, and this program does not guess")
+    .next(format!("put a line '# transform: {TRANSFORM}' first, with poses that map board to camera coordinates")))
+}
+
 fn read(text: &str, json: bool) -> Result<Vec<(usize, Rigid<Camera, Board>)>> {
-    let rows =
-        if json {
-            json_rows(text, TRANSFORM)?
-        } else {
-            let stated = text.lines().find_map(|l| l.trim().strip_prefix('#')?.trim().strip_prefix("transform:"));
-            if stated.map(str::trim) != Some(TRANSFORM) {
-                return Err(Fault::input(match stated {
-                Some(other) => format!("transform is '{}', only '{TRANSFORM}' is read", other.trim()),
-                None => "does not say what its poses are".into(),
-            })
-            .cause("a board's pose may be written as camera_T_board or board_T_camera, and this program does not guess")
-            .next(format!("put a line '# transform: {TRANSFORM}' first, with poses that map board to camera \
-                           coordinates")));
-            }
-            pose_csv::read(text)?.rows
-        };
+    let rows = if json {
+        json_rows(text, TRANSFORM)?
+    } else {
+        check_transform(text)?;
+        pose_csv::read(text)?.rows
+    };
     let mut out: Vec<(usize, Rigid<Camera, Board>)> = Vec::new();
     for (number, convention, numbers) in rows {
         if out.iter().any(|(n, _)| *n == number) {

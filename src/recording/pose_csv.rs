@@ -3,7 +3,7 @@
 //! Frame and unit: those of the convention (docs/conventions.md).
 
 use crate::fault::{Fault, Result};
-use crate::files::{TableRow, table};
+use crate::files::{TableRow, stated, table};
 use crate::robot::Convention;
 
 /// One pose: its number, its convention, its values.
@@ -19,7 +19,11 @@ pub(super) struct Read {
 /// `frame,m00,...,m33` is a matrix in mm; every other layout is preceded by a line `# convention: NAME`.
 pub(super) fn read(text: &str) -> Result<Read> {
     let convention = convention(text)?;
-    let in_mm = stated_unit(text)?;
+    let in_mm = stated_mm(
+        text,
+        "convert the positions to mm (of matrices the columns m03, m13, m23); other notations may state units in the \
+         columns' names: X_mm,...,RX_deg",
+    )?;
     let (mut header, mut rows) = (None, Vec::new());
     for r in table(text, ',') {
         let here = |e: Fault| e.at(format!("line {}", r.line));
@@ -32,35 +36,57 @@ pub(super) fn read(text: &str) -> Result<Read> {
     Ok(Read { length_stated: in_mm || stated(|h| h.length_stated), angle_stated: stated(|h| h.angle_stated), rows })
 }
 
-/// The convention that the last comment before the header names.
+/// The convention that the comments name.
 fn convention(text: &str) -> Result<Option<Convention>> {
-    let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim);
-    let comments = lines.take_while(|l| l.is_empty() || l.starts_with('#'));
-    let names = comments.filter_map(|l| l.trim_start_matches('#').trim().strip_prefix("convention:"));
-    let named = names.last().map(|name| name.trim().parse::<Convention>()).transpose();
-    named.map_err(|e| Fault::input(e).next("name a convention of docs/conventions.md"))
-}
-
-/// A comment above the header that states a unit is honoured or refused: mm is what matrices and most robots have, and
-/// the header's columns state all others.
-fn stated_unit(text: &str) -> Result<bool> {
-    let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim);
-    let comments = lines.take_while(|l| l.is_empty() || l.starts_with('#'));
-    let stated = comments.filter_map(|l| {
-        let (key, value) = l.trim_start_matches('#').split_once([':', '='])?;
-        matches!(key.trim().to_lowercase().as_str(), "unit" | "units").then(|| value.trim().to_lowercase())
-    });
-    for value in stated.clone() {
-        if unit(&value) != Some("mm") {
-            return Err(Fault::input(format!("a comment states the unit '{value}', only 'mm' is read there"))
-                .cause("positions in another unit, or units of lengths and angles in one line")
-                .next(
-                    "convert the positions to mm (of matrices the columns m03, m13, m23); other notations may state \
-                     units in the columns' names: X_mm,...,RX_deg",
-                ));
+    let mut named = None;
+    for name in stated(text, &["convention"]) {
+        let read = name.to_lowercase().parse::<Convention>();
+        let convention = read.map_err(|e| Fault::input(e).next("name a convention of docs/conventions.md"))?;
+        match named.replace(convention) {
+            Some(other) if other != convention => {
+                return Err(Fault::input(format!(
+                    "comments name two conventions, '{}' and '{}'",
+                    other.name(),
+                    convention.name()
+                ))
+                .cause("two files were joined, or a line of another file stayed")
+                .next("keep the one in which the robot writes its poses"));
+            }
+            _ => {}
         }
     }
-    Ok(stated.count() > 0)
+    Ok(named)
+}
+
+/// The unit of lengths that a table's comments state: only mm is accepted there.
+///
+/// # Errors
+/// Another unit; `next` is the step to propose.
+pub(super) fn stated_mm(text: &str, next: &str) -> Result<bool> {
+    let values = stated(text, &["unit", "units"]);
+    match values.iter().find(|value| unit(&value.to_lowercase()) != Some("mm")) {
+        Some(value) => Err(Fault::input(format!("a comment states the unit '{value}', only 'mm' is read there"))
+            .cause("lengths in another unit, or units of lengths and angles in one line")
+            .next(next)),
+        None => Ok(!values.is_empty()),
+    }
+}
+
+/// Refuses poses whose comments state another layout or another transform than the one in `transforms`, which has
+/// the same meaning in each of its spellings.
+pub(super) fn check_statements(text: &str, transforms: &[&str]) -> Result<()> {
+    for (key, says, read) in [
+        ("transform", "a comment states the transform", transforms),
+        ("layout", "a comment states the layout", &["row-major 4x4", "row-major"]),
+    ] {
+        let values = stated(text, &[key]);
+        if let Some(other) = values.iter().find(|value| !read.contains(value)) {
+            return Err(Fault::input(format!("{says} '{other}', only '{}' is read", read[0]))
+                .cause("another program's convention: inverted poses, or those of a tool, a camera or a work frame")
+                .next("convert the poses first; if they are right and the comment is not, correct the comment"));
+        }
+    }
+    Ok(())
 }
 
 struct Header {
@@ -216,5 +242,25 @@ mod tests {
         assert!(said(&format!("# convention: denso\nframe,x,y,z,rx,ry,rz\n{quoted}\n")).contains("decimal commas"));
         assert!(said("\u{feff}# convention: denso\nframe,x,y,z,rx,ry,rz\n0,1,2,3,4,5,6\n").is_empty());
         assert!(said("frame,x,y,z,rx,ry,rz\n0,1,2,3,4,5,6\n").contains("without a convention"));
+    }
+
+    #[test]
+    fn comments_are_honoured_or_refused() {
+        let with = |comments: &str| said(&format!("{comments}\nframe,x,y,z,rx,ry,rz\n0,1,2,3,40,5,6\n"));
+        for good in ["# Convention: DENSO", "#convention = denso", "# convention: denso\n# convention: denso"] {
+            assert_eq!(with(good), "", "{good}");
+        }
+        let two = with("# convention: denso\n# convention: gba");
+        assert!(two.contains("two conventions, 'denso' and 'gba'"), "{two}");
+        // Also below the header.
+        let late = said("# convention: denso\nframe,x,y,z,rx,ry,rz\n# convention: gba\n0,1,2,3,40,5,6\n");
+        assert!(late.contains("two conventions"), "{late}");
+        let transform = |comment: &str| check_statements(comment, &["base_T_flange", "base_from_flange"]);
+        assert!(transform("# transform: base_T_flange\n# Transform = base_from_flange\n# made: today").is_ok());
+        for other in ["flange_T_base", "base_T_tool", "base_T_camera"] {
+            let said = transform(&format!("# TRANSFORM: {other}\n")).unwrap_err().what;
+            assert!(said.contains(other) && said.contains("only 'base_T_flange' is read"), "{said}");
+        }
+        assert!(transform("# layout: column-major 4x4").is_err() && transform("# layout: row-major 4x4").is_ok());
     }
 }

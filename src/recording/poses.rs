@@ -1,7 +1,7 @@
 //! In: pose files (JSON matrices, CSV matrices, CSV in a named robot convention). Out: base_from_flange.
 //! Frame and unit: base and flange; the file states its units, the result is in mm.
 
-use super::pose_csv::Row;
+use super::pose_csv::{Row, check_statements};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, ORTHONORMAL_WARN, Rigid};
 use crate::robot::{Convention, Written};
@@ -169,6 +169,7 @@ pub fn looks_like_metres(poses: &[Rigid<Base, Flange>]) -> Option<String> {
 }
 
 fn from_csv(text: &str) -> Result<PoseFile> {
+    check_statements(text, &["base_T_flange", "base_from_flange"])?;
     let read = super::pose_csv::read(text)?;
     let convention = read.rows.first().map_or(Convention::Matrix, |r| r.1);
     if !read.angle_stated {
@@ -262,6 +263,18 @@ mod tests {
         for comment in ["# units: m", "# Unit = metres", "# units: mm, deg"] {
             let said = from_csv(&format!("{comment}\n{head}")).unwrap_err();
             assert!(said.what.contains("only 'mm' is read there"), "{comment}: {said}");
+        }
+    }
+
+    #[test]
+    fn a_transform_in_a_comment_is_honoured_or_refused() {
+        let head = format!("frame,{}\n0,1,0,0,5,0,1,0,6,0,0,1,7,0,0,0,1\n", Convention::Matrix.labels().join(","));
+        assert_eq!(from_csv(&format!("# transform: base_T_flange\n{head}")).unwrap().poses.len(), 1);
+        for comment in ["# transform: flange_T_base", "# Transform = base_T_tool", "# layout: column-major"] {
+            for text in [format!("{comment}\n{head}"), format!("{head}{comment}\n")] {
+                let said = from_csv(&text).unwrap_err();
+                assert!(said.what.starts_with("a comment states the "), "{comment}: {said}");
+            }
         }
     }
 

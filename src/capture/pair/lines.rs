@@ -53,6 +53,8 @@ pub struct Lines {
     reach: f64,
     largest_angle: f64,
     unit: Option<CountUnit>,
+    /// The unit of lengths that the head states, if it names one.
+    length: Option<String>,
 }
 
 fn head() -> &'static str {
@@ -89,6 +91,7 @@ impl Lines {
                 .cause("six numbers can be read in nine ways, and times by two clocks; this program does not guess")
                 .next(head()));
         };
+        self.length_is_that_of(kind)?;
         let bad = |why: &str| {
             Fault::input(format!(
                 "'{}' is not a line of times and {}: {why}",
@@ -116,13 +119,35 @@ impl Lines {
         Ok(Some(Told { t_ns, stand }))
     }
 
+    /// Refuses a stated unit of lengths that is not the convention's.
+    fn length_is_that_of(&self, kind: Kind) -> Result<()> {
+        let (Some(stated), Kind::Pose(convention)) = (&self.length, kind) else { return Ok(()) };
+        // Matrices have no units in their labels; their lengths are in mm.
+        let is = convention.labels()[0].split_once(' ').map_or("mm", |(_, unit)| unit);
+        if stated == is {
+            return Ok(());
+        }
+        Err(Fault::input(format!("the head states the unit '{stated}', {} has lengths in {is}", convention.name()))
+            .cause("lengths in another unit, or units of lengths and angles in one line")
+            .next(format!("send lengths in {is}, and state '# units: {is}' or nothing")))
+    }
+
     fn head(&mut self, said: &str) -> Result<()> {
         let Some((key, value)) = said.split_once(':').map(|(k, v)| (k.trim(), v.trim())) else { return Ok(()) };
         let refuse = |what: String| Err(Fault::input(what).cause("a head of another program").next(head()));
-        match key {
+        match key.to_lowercase().as_str() {
             "convention" => {
-                let convention = value.parse::<Convention>().map_err(|e| Fault::input(e).next(head()))?;
-                self.kind = Some(Kind::Pose(convention));
+                let named = value.to_lowercase().parse::<Convention>();
+                let kind = Kind::Pose(named.map_err(|e| Fault::input(e).next(head()))?);
+                match self.kind.replace(kind) {
+                    Some(Kind::Pose(other)) if Kind::Pose(other) != kind => {
+                        return refuse(format!("the head names two conventions, '{}' and '{value}'", other.name()));
+                    }
+                    _ => {}
+                }
+            }
+            "transform" if !["base_T_flange", "base_from_flange"].contains(&value) => {
+                return refuse(format!("the head states the transform '{value}', only 'base_T_flange' is read"));
             }
             "counts" => {
                 let known = [CountUnit::Count, CountUnit::Mm, CountUnit::Deg];
@@ -138,7 +163,8 @@ impl Lines {
                     other => return refuse(format!("the clock is '{other}': unix or own")),
                 });
             }
-            "units" if value == "as named" => self.meant = true,
+            "unit" | "units" if value == "as named" => self.meant = true,
+            "unit" | "units" => self.length = Some(value.to_lowercase()),
             _ => {}
         }
         Ok(())
@@ -249,6 +275,8 @@ mod tests {
         let pose = "400 0 300 180 0 90";
         assert_eq!(all(&stream(denso, 50_000_000, pose)), Ok(12));
         assert_eq!(all(&stream("# counts: count\n# clock: own", 50_000_000, "17")), Ok(12));
+        let more = "# Convention: DENSO\n# convention: denso\n# transform: base_T_flange\n# unit: mm\n# Clock: own";
+        assert_eq!(all(&stream(more, 50_000_000, pose)), Ok(12));
         for (head, per_line, pose, says) in [
             ("# clock: own", 50_000_000, pose, "their convention and clock"),
             ("# convention: denso", 50_000_000, pose, "their convention and clock"),
@@ -262,6 +290,9 @@ mod tests {
             (denso, 50_000_000, "400 0 300 180 0 x", "not numbers"),
             ("# convention: denso\n# clock: unix", 50_000_000, pose, "clock: own"),
             ("# counts: inch\n# clock: own", 1, "5", "count, mm or deg"),
+            ("# convention: denso\n# convention: gba\n# clock: own", 1, pose, "two conventions, 'denso' and 'gba'"),
+            ("# convention: denso\n# Transform: flange_T_base\n# clock: own", 1, pose, "'flange_T_base'"),
+            ("# units: m\n# convention: denso\n# clock: own", 1, pose, "the unit 'm', denso has lengths in mm"),
         ] {
             let said = all(&stream(head, per_line, pose)).unwrap_err();
             assert!(said.contains(says) && said.contains("next step"), "{says}: {said}");
