@@ -347,7 +347,7 @@ fn counts_of_a_conveyor_put_profiles_together() {
         }
         writeln!(rows, "{shot},{count}").unwrap();
     }
-    std::fs::write(&profiles, points).unwrap();
+    std::fs::write(&profiles, &points).unwrap();
     std::fs::write(&counts, &rows).unwrap();
     let out = dir.path().join("scan");
     let args = |way: &'static str| {
@@ -368,6 +368,16 @@ fn counts_of_a_conveyor_put_profiles_together() {
     let rms = (off.iter().map(|v| v * v).sum::<f64>() / off.len() as f64).sqrt();
     println!("{} of {} points: rms {rms:.4} mm", off.len(), cloud.len());
     assert!((0.8..1.25).contains(&(rms / SIGMA)) && off.len() > 100_000 && off.iter().all(|v| v.abs() < 6.0 * SIGMA));
+    // The numbers of the profiles count, not their order in the file.
+    let lines: Vec<&str> = points.lines().skip(1).collect();
+    let turned: Vec<&str> = lines.rchunks(PLACES).flatten().copied().collect();
+    std::fs::write(&profiles, format!("profile,x,z\n{}\n", turned.join("\n"))).unwrap();
+    run(args("0.001,-0.0124,0.0006"));
+    assert!(sheetlight::station::cloud_of(&out).unwrap() == cloud, "the order in the file changed the points");
+    let without = [&lines[..7 * PLACES], &lines[8 * PLACES..]].concat();
+    std::fs::write(&profiles, format!("profile,x,z\n{}\n", without.join("\n"))).unwrap();
+    assert!(fails(args("0,0.01,0")).contains("profile 8 follows 6, 7 is missing"));
+    std::fs::write(&profiles, &points).unwrap();
     assert!(fails(args("0,0.001,0.02")).contains("leads along z of the sensor"));
     assert!(fails(args("0,0,0")).contains("0 mm long"));
     std::fs::write(&counts, rows.replace("\n7,570", "")).unwrap();

@@ -1,20 +1,70 @@
 //! In: files of line profiles (CSV, matrices and plain sequences in YAML and JSON). Out: lists of x, z points.
 //! Frame and unit: the sensor's own plane, mm.
 
+use super::super::pose_csv::stated_mm;
 use super::profile::Profile;
 use super::sequences::{by_turns, from_brackets, value};
 use crate::fault::{Fault, Result};
 use crate::files::{TableRow, natural, table};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Reads profiles from one file with many, or from a folder with one file each, in the order of their names (numbers
-/// in names are compared as numbers). Places without a measurement stay, with a number that is not finite.
+/// in names are compared as numbers). Profiles that a table numbers are in the order of their numbers. Places without a
+/// measurement stay, with a number that is not finite.
 pub fn load(path: &Path) -> Result<Vec<Profile>> {
     let mut out = Vec::new();
     for f in files_of(path)? {
-        out.extend(load_file(&f)?);
+        out.push(load_file(&f)?);
     }
-    Ok(out)
+    let numbers: Vec<f64> = out.iter().filter_map(|read| read.numbers.as_ref()).flatten().copied().collect();
+    // The files of a folder may each begin at 0, or each hold the profile of one number.
+    let once = numbers.iter().map(|n| n.to_bits()).collect::<BTreeSet<_>>().len() == numbers.len();
+    if out.len() > 1 && once && out.iter().all(|read| read.numbers.is_some()) {
+        let profiles = out.into_iter().flat_map(|read| read.profiles).collect();
+        return Read { profiles, numbers: Some(numbers) }.in_order().map_err(|e| e.at(path.display()));
+    }
+    let each = out.into_iter().map(Read::in_order).collect::<Result<Vec<_>>>();
+    each.map(|all| all.concat()).map_err(|e| e.at(path.display()))
+}
+
+/// Profiles in the order of their file, and the number of each if a table states them all.
+struct Read {
+    profiles: Vec<Profile>,
+    numbers: Option<Vec<f64>>,
+}
+
+impl From<Vec<Profile>> for Read {
+    fn from(profiles: Vec<Profile>) -> Read {
+        Read { profiles, numbers: None }
+    }
+}
+
+impl Read {
+    /// The profiles in the order of their numbers. These may begin anywhere and count in any step.
+    ///
+    /// # Errors
+    /// A number twice, or one that is left out: later profiles would belong to other poses.
+    fn in_order(self) -> Result<Vec<Profile>> {
+        let Some(numbers) = self.numbers else { return Ok(self.profiles) };
+        let mut all: Vec<(f64, Profile)> = numbers.into_iter().zip(self.profiles).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some(two) = all.windows(2).find(|w| w[0].0 == w[1].0) {
+            return Err(Fault::input(format!("profile {} is there twice", two[0].0))
+                .cause("two files were joined")
+                .next("number the profiles in the order of their poses or counts"));
+        }
+        let steps = || all.windows(2).map(|w| w[1].0 - w[0].0);
+        let step = steps().fold(f64::INFINITY, f64::min);
+        if let Some(k) = steps().position(|s| s != step) {
+            let (before, after) = (all[k].0, all[k + 1].0);
+            let what = format!("profile {after} follows {before}, {} is missing", before + step);
+            return Err(Fault::input(what)
+                .cause("a profile without points was not exported, or is lost")
+                .next("write it too, its places as nan; or take out its pose or count and number what is left"));
+        }
+        Ok(all.into_iter().map(|(_, profile)| profile).collect())
+    }
 }
 
 /// The files that [`load`] reads, in their order.
@@ -39,13 +89,13 @@ pub fn files_of(path: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-fn load_file(path: &Path) -> Result<Vec<Profile>> {
+fn load_file(path: &Path) -> Result<Read> {
     let text = crate::files::read_text(path)?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let read = match () {
-        () if text.contains("opencv-matrix") => from_yaml(&text, &stem),
-        () if text.contains('[') => from_brackets(&text, &stem),
-        () => from_csv(&text, &stem),
+        () if text.contains("opencv-matrix") => from_yaml(&text, &stem).map(Read::from),
+        () if text.contains('[') => from_brackets(&text, &stem).map(Read::from),
+        () => read_csv(&text, &stem),
     };
     read.map_err(|e| e.at(path.display()))
 }
@@ -80,12 +130,22 @@ impl Columns {
     }
 }
 
-/// Columns x, z (one profile), or profile, x, z (many). A header may name the columns in another order.
+/// Columns x, z (one profile), or profile, x, z (many). A header may name the columns in another order. Profiles are in
+/// the order of their numbers; names that are no numbers keep the file's order.
+///
+/// # Errors
+/// Another layout or unit; a profile twice, or left out.
 pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
+    read_csv(text, stem)?.in_order()
+}
+
+fn read_csv(text: &str, stem: &str) -> Result<Read> {
+    stated_mm(text, "export the profiles in mm")?;
     let first = text.lines().map(str::trim).find(|l| !l.is_empty() && !l.starts_with('#')).unwrap_or_default();
     let separator = [';', ','].into_iter().find(|c| first.contains(*c)).unwrap_or(' ');
     let mut columns: Option<Columns> = None;
     let mut out: Vec<Profile> = Vec::new();
+    let mut numbers: Vec<Option<f64>> = Vec::new();
     for TableRow { line: number, text: line, mut cells } in table(text, separator) {
         // A separator at the end of a line starts no new cell.
         while cells.last().is_some_and(String::is_empty) {
@@ -123,13 +183,20 @@ pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
                 return Err(bad("belongs to a profile that was closed before: keep a profile's lines together"));
             }
             out.push(Profile { name, points: Vec::new() });
+            numbers.push(profile.and_then(|i| whole(cells.get(i)?)));
         }
         out.last_mut().expect("pushed above").points.push(point);
     }
     if out.is_empty() {
         return Err(Fault::input("holds no points").cause("an empty file").next("export the profiles again"));
     }
-    Ok(out)
+    let numbers = numbers.into_iter().collect::<Option<Vec<f64>>>().filter(|numbers| !numbers.is_empty());
+    Ok(Read { profiles: out, numbers })
+}
+
+/// A profile's number: whole, and small enough to be exact.
+fn whole(cell: &str) -> Option<f64> {
+    cell.parse().ok().filter(|n: &f64| n.fract() == 0.0 && (0.0..1e15).contains(n))
 }
 
 /// Reads every matrix of an OpenCV FileStorage file: 2 x N, N x 2, or N elements of two channels.
@@ -217,6 +284,41 @@ mod tests {
         let lines = from_csv("1 10 2 11.5 3 12\n4 5 5 6 6 7\n", "a").unwrap();
         assert_eq!((lines.len(), &lines[0].points, lines[1].points[2]), (2, &want, [6.0, 7.0]));
         assert!(from_csv("1,2,3,4\n", "a").is_err() && from_csv("a,b\n1,2\n", "a").is_err());
+    }
+
+    #[test]
+    fn profiles_are_in_the_order_of_their_numbers() {
+        let firsts = |text: &str| from_csv(text, "a").map(|all| all.iter().map(|p| p.points[0][1]).collect::<Vec<_>>());
+        for (text, want) in [
+            ("profile,x,z\n2,0,12\n2,1,0\n0,0,10\n1,0,11\n", [10.0, 11.0, 12.0]),
+            ("2,0,12\n1,0,11\n0,0,10\n", [10.0, 11.0, 12.0]),
+            // From 1, and every tenth picture of a sensor.
+            ("x;z;profile\n0;12;3\n0;10;1\n0;11;2\n", [10.0, 11.0, 12.0]),
+            ("frame,x,z\n4730,0,12\n4710,0,10\n4720,0,11\n", [10.0, 11.0, 12.0]),
+            ("profile,x,z\nleft,0,12\nmiddle,0,10\nright,0,11\n", [12.0, 10.0, 11.0]),
+        ] {
+            assert_eq!(firsts(text).unwrap(), want, "{text}");
+        }
+        let said = |text: &str| firsts(text).unwrap_err().to_string();
+        let gap = said("profile,x,z\n0,0,1\n1,0,1\n3,0,1\n");
+        assert!(gap.contains("profile 3 follows 1, 2 is missing"), "{gap}");
+        assert!(said("profile,x,z\n0,0,1\n1,0,1\n01,0,1\n").contains("profile 1 is there twice"));
+        assert!(said("# unit: um\nprofile,x,z\n0,0,1\n").contains("the unit 'um'"));
+        assert!(firsts("# Units = mm\nprofile,x,z\n0,0,1\n").is_ok());
+    }
+
+    #[test]
+    fn the_files_of_a_folder_are_numbered_together_or_each() {
+        let dir = tempfile::tempdir().unwrap();
+        let firsts = |files: [&str; 2]| {
+            for (name, text) in ["a.csv", "b.csv"].into_iter().zip(files) {
+                std::fs::write(dir.path().join(name), text).unwrap();
+            }
+            load(dir.path()).unwrap().iter().map(|p| p.points[0][1]).collect::<Vec<_>>()
+        };
+        assert_eq!(firsts(["profile,x,z\n1,0,11\n", "profile,x,z\n0,0,10\n"]), [10.0, 11.0]);
+        let each = ["profile,x,z\n1,0,11\n0,0,10\n", "profile,x,z\n0,0,12\n1,0,13\n"];
+        assert_eq!(firsts(each), [10.0, 11.0, 12.0, 13.0]);
     }
 
     #[test]
