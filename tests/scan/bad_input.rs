@@ -119,6 +119,22 @@ fn a_bad_shot_can_be_left_out_and_is_listed() {
 }
 
 #[test]
+fn repeated_pictures_and_poses_are_named() {
+    let b = Bench::new(20);
+    let remarks = || {
+        let report: serde_json::Value = serde_json::from_str(&sheetlight(&b.args(&["--json"]))).unwrap();
+        report["remarks"].to_string()
+    };
+    let said = remarks();
+    assert!(!said.contains("two poses") && !said.contains("same pose"), "{said}");
+    std::fs::copy(b.recording.join("7.png"), b.recording.join("8.png")).unwrap();
+    b.edit("meta.json", "\"pose\":12", "\"pose\":11");
+    let said = remarks();
+    assert!(said.contains("shots 7 and 8 have the same picture at two poses"), "{said}");
+    assert!(said.contains("shots 11 and 12 have two pictures at the same pose"), "{said}");
+}
+
+#[test]
 fn wrong_sizes_depths_and_poses_are_named_with_their_numbers() {
     let b = Bench::new(12);
     save_png(&Image::from_u8(320, 240, vec![0; 320 * 240]), &b.recording.join("3.png")).unwrap();

@@ -76,6 +76,7 @@ impl Done<'_> {
                 .into_iter()
                 .chain(self.source.remarks())
                 .chain(scanner.remark())
+                .chain(state.repeats.remarks())
                 .chain(self.stopped)
                 .collect(),
             files,

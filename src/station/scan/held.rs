@@ -4,7 +4,7 @@
 use super::done::{Done, scanner_for};
 use super::options::ScanOptions;
 use super::products::{FEWEST_OF_A_MAP, figures};
-use super::progress::Checkpoint;
+use super::progress::{Checkpoint, fingerprint_of};
 use super::refined::Refined;
 use super::report::{ScanReport, Spent};
 use super::spread::Spread;
@@ -14,6 +14,7 @@ use crate::rig::Rig;
 use crate::scan::{
     CloudPoint, Extraction, Format, GridOptions, HeightMap, Profile, Refining, Shots, Source, grid_on, parts_for,
 };
+use std::collections::VecDeque;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
@@ -79,6 +80,8 @@ pub fn scan_held(
     let (mut scanner, mut seen) = scanner_for(rig, &*source, options, options.place.open()?)?;
     let total = source.remaining();
     let (mut state, mut gathered, mut ended) = (Checkpoint::new(String::new()), Gathered::default(), false);
+    // Fingerprints of the pictures being processed, oldest first.
+    let mut pictures = VecDeque::new();
     while !ended {
         let next = source.next();
         if options.stop.load(Ordering::Relaxed) {
@@ -89,6 +92,7 @@ pub fn scan_held(
         match next {
             Some(Ok(shot)) => {
                 seen.look(shot.index, &shot.image);
+                pictures.push_back(fingerprint_of(&shot.image));
                 scanner.push(shot)?;
             }
             Some(Err(bad)) if options.skip_bad && !bad.last => state.skipped.push((bad.name, bad.fault.what)),
@@ -97,7 +101,7 @@ pub fn scan_held(
         }
         for profile in if ended { scanner.finish()? } else { scanner.ready()? } {
             gathered.take(&profile)?;
-            state.add(&profile);
+            state.add(&profile, pictures.pop_front().expect("a picture a profile"));
         }
         progress(state.shots, total);
     }

@@ -265,8 +265,7 @@ impl<'a> Work<'a> {
             // Points and state are updated together: what is counted here is what a resumed scan has stored.
             self.cloud.append(&profile.points)?;
             self.shots.add(profile.shot, profile.from_camera);
-            self.state.add(profile);
-            self.state.last_picture = Some(picture);
+            self.state.add(profile, picture);
             if self.state.shots.is_multiple_of(CHECKPOINT_SHOTS) {
                 self.save()?;
             }
