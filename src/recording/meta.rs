@@ -81,7 +81,7 @@ pub struct ImageSpec {
     pub height: u32,
     /// Depth of the sensor's grey levels, bits, 8..=16; picture files with more than 8 have 16.
     pub bits: u8,
-    /// Values per pixel, always 1; [`super::Recording::channel`] selects one of a colour picture's three.
+    /// Values per pixel of the files: 1, or 3 of colour pictures, of which [`super::Recording::channel`] selects one.
     pub channels: u8,
     /// Relation of the levels to the light: "linear", "srgb", or a gamma.
     pub response: Response,
@@ -110,6 +110,12 @@ impl ImageSpec {
             return refuse(
                 format!("image {}x{} with {} bits is out of range", self.width, self.height, self.bits),
                 "bits must be 8 to 16 and the size at least 1x1",
+            );
+        }
+        if ![1, 3].contains(&self.channels) {
+            return refuse(
+                format!("image.channels is {}, only 1 (grey) and 3 (colour) are read", self.channels),
+                "store the pictures grey, or in colour without other channels",
             );
         }
         if let Some(readout) = self.readout.filter(|r| r.step().contains(&0)) {

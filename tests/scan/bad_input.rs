@@ -160,6 +160,9 @@ fn wrong_sizes_depths_and_poses_are_named_with_their_numbers() {
     b.edit("meta.json", "\"mm\"", "\"inch\"");
     b.fails(&[], &["inch"]);
     let b = Bench::new(12);
+    b.edit("meta.json", "\"channels\":1", "\"channels\":2");
+    b.fails(&[], &["image.channels is 2"]);
+    let b = Bench::new(12);
     b.edit("meta.json", "\"beam\"", "\"beem\"");
     b.fails(&[], &["beem"]);
 }
