@@ -387,9 +387,13 @@ mod tests {
         assert!(scan(&half).unwrap_err().what.contains("f08.png: is 200x150, f00.png is 400x300"));
         let webp = |dir: &Path| std::fs::rename(at(dir, 8), dir.join("f08.webp")).unwrap();
         assert!(scan(&webp).unwrap_err().what.contains("f08.webp: is a picture of a format that is not read"));
-        let copy = |dir: &Path| drop(std::fs::copy(at(dir, 3), dir.join("f03 (1).png")).unwrap());
+        let copy = |dir: &Path| {
+            std::fs::copy(at(dir, 3), dir.join("f03 (1).png")).unwrap();
+        };
         assert!(scan(&copy).unwrap_err().what.contains("holds the same picture as"));
-        let both = |dir: &Path| drop(std::fs::copy(at(dir, 3), dir.join("f03.bmp")).unwrap());
+        let both = |dir: &Path| {
+            std::fs::copy(at(dir, 3), dir.join("f03.bmp")).unwrap();
+        };
         assert!(scan(&both).unwrap_err().cause.contains("two formats"));
         let mirrored = |dir: &Path| {
             let image = picture(38.0);

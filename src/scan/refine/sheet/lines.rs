@@ -25,6 +25,28 @@ const MOST: f64 = 1.5;
 const DARK: f64 = 0.45;
 /// Weight of a neighbouring line's points below which it counts as dark in part, over 1.
 const SEEN: f64 = 0.25;
+/// A shot whose sheet lies nearer than this share of the usual way from shot to shot shows no change of the light: the
+/// camera stood still, and noise divided by almost no way would be any slope.
+const STANDING: f64 = 0.25;
+/// Share of the scan's whole way that consists of steps of the usual way and longer ones. Pictures of a camera that
+/// stands add little to it however many they are, and the long ways between two passes are few.
+const USUAL: f64 = 0.75;
+/// Lines to each side that are stepped over at most because the camera stood. It may stand longer: the points between
+/// have no neighbours and stay.
+const HELD: u32 = 7;
+/// Points of a line at which its way to another is measured.
+const SAMPLES: usize = 64;
+
+/// Which shots are neighbours.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Neighbours {
+    /// Number of shots within which they are.
+    pub reach: u32,
+    /// Number of shots within which the light's end is looked for; 0 if shots are coarser than the sheet.
+    pub ends: u32,
+    /// Least way from one to the next, mm.
+    pub least_way: f64,
+}
 
 /// What a point's neighbours in the shots before and after show about it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -76,17 +98,49 @@ fn in_picture(along: Along, p: &CloudPoint) -> (f32, f32) {
     if along == Along::U { (p.u, p.v) } else { (p.v, p.u) }
 }
 
+impl Place {
+    fn of(shot: u32, shots: &Shots) -> Option<Place> {
+        let (place, sheet) = shots.place(shot).zip(shots.sheet)?;
+        let normal = place.direction(&sheet.normal);
+        let on = place.point(&(sheet.normal * sheet.offset));
+        Some(Place { eye: place.point(&Vec3::zeros()), sheet: Plane::new(normal, normal.dot(&on))? })
+    }
+
+    /// Mean distance of the sheet from the points of another line, mm: the way from shot to shot.
+    fn way(&self, points: &[CloudPoint]) -> f64 {
+        let some = points.iter().step_by(points.len().div_ceil(SAMPLES).max(1));
+        let (sum, n) = some.fold((0.0, 0.0), |(sum, n), p| (sum + self.sheet.distance(&p.at()).abs(), n + 1.0));
+        sum / n
+    }
+}
+
+/// Least way between two shots at which one shows how the light changes at the other, mm, from the ways between all
+/// successive shots of the cloud.
+pub(super) fn least_way(cloud: &dyn PointSource, shots: &Shots) -> Result<f64> {
+    let mut ways = Vec::new();
+    cloud.for_each_chunk(&mut |points| {
+        for line in points.chunk_by(|a, b| a.shot == b.shot) {
+            let before = line[0].shot.checked_sub(1).and_then(|shot| Place::of(shot, shots));
+            ways.extend(before.map(|place| place.way(line)).filter(|way| way.is_finite()));
+        }
+    })?;
+    ways.sort_by(|a, b| b.total_cmp(a));
+    let enough = USUAL * ways.iter().sum::<f64>();
+    let mut sum = 0.0;
+    let usual = ways.into_iter().find(|way| {
+        sum += way;
+        sum >= enough
+    });
+    Ok(STANDING * usual.unwrap_or(0.0))
+}
+
 fn light(p: &CloudPoint) -> f64 {
     f64::from(p.intensity.max(f32::MIN_POSITIVE)).ln()
 }
 
 impl Line {
     fn new(shot: u32, points: Vec<CloudPoint>, shots: &Shots) -> Line {
-        let place = shots.place(shot).zip(shots.sheet).and_then(|(place, sheet)| {
-            let normal = place.direction(&sheet.normal);
-            let on = place.point(&(sheet.normal * sheet.offset));
-            Some(Place { eye: place.point(&Vec3::zeros()), sheet: Plane::new(normal, normal.dot(&on))? })
-        });
+        let place = Place::of(shot, shots);
         let mut order: Vec<(f32, u32)> =
             points.iter().zip(0..).map(|(p, i)| (in_picture(shots.along, p).0, i)).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -207,25 +261,42 @@ impl Line {
         far.is_finite().then_some(far)
     }
 
-    /// `company` are the lines near this one, in their order. Only shots without a gap between are neighbours: across
-    /// dark and missing shots it is unknown what happened.
-    fn pulled(self: Arc<Line>, company: &VecDeque<Arc<Line>>, reach: u32, ends: u32) -> Pulled {
-        let has = |shot: u32| company.iter().find(|line| line.shot == shot);
-        let unbroken = |way: i64| {
-            let at = |k: i64| u32::try_from(i64::from(self.shot) + way * k).ok().and_then(has);
-            (1..=i64::from(reach.max(ends))).map_while(at).collect::<Vec<_>>()
+    /// The lines to one side of this one in their order, of `company`, whose sheets have moved on. Only successive
+    /// shots are neighbours: across dark and missing shots it is unknown what happened between.
+    fn beyond<'a>(&self, company: &'a VecDeque<Arc<Line>>, side: i64, near: Neighbours) -> Vec<&'a Arc<Line>> {
+        let has = |shot: i64| company.iter().find(|line| i64::from(line.shot) == shot);
+        let successive = (1..).map_while(|k| has(i64::from(self.shot) + side * k));
+        let mut last = 0.0;
+        let moved = |line: &&Arc<Line>| {
+            let Some(place) = &line.place else { return true };
+            let way = place.way(&self.points);
+            let moved = way - last >= near.least_way;
+            last = if moved { way } else { last };
+            moved
         };
-        let (before, after) = (unbroken(-1), unbroken(1));
+        successive.take(near.within() as usize).filter(moved).take(near.reach.max(near.ends) as usize).collect()
+    }
+
+    /// `company` are the lines near this one, in their order.
+    fn pulled(self: Arc<Line>, company: &VecDeque<Arc<Line>>, near: Neighbours) -> Pulled {
+        let (before, after) = (self.beyond(company, -1, near), self.beyond(company, 1, near));
         let far = after.first().and_then(|next| self.far(next));
-        let near: Vec<[Option<&Arc<Line>>; 2]> =
-            nearest(reach).map(|k| [before.get(k - 1).copied(), after.get(k - 1).copied()]).collect();
+        let pairs: Vec<[Option<&Arc<Line>>; 2]> =
+            nearest(near.reach).map(|k| [before.get(k - 1).copied(), after.get(k - 1).copied()]).collect();
         // An edge darkens all lines beyond it: every eighth of the distance is enough.
-        let every = (ends as usize).div_ceil(8);
+        let every = (near.ends as usize).div_ceil(8);
         let some = |lines: Vec<&Arc<Line>>| lines.into_iter().rev().step_by(every).cloned().collect::<Vec<_>>();
-        let beyond = (ends > 0).then(|| [some(before), some(after)].concat());
-        let pull = |i| self.pull(i, &near, beyond.as_deref());
+        let beyond = (near.ends > 0).then(|| [some(before), some(after)].concat());
+        let pull = |i| self.pull(i, &pairs, beyond.as_deref());
         let pulls = (0..self.points.len()).into_par_iter().with_min_len(64).map(pull).collect();
         Pulled { line: self.clone(), pulls, far }
+    }
+}
+
+impl Neighbours {
+    /// Number of lines to each side that may be needed.
+    fn within(self) -> u32 {
+        self.reach.max(self.ends) + HELD
     }
 }
 
@@ -234,21 +305,19 @@ pub(super) fn nearest(reach: u32) -> std::ops::RangeInclusive<usize> {
     reach as usize / 2 + 1..=reach as usize
 }
 
-/// Passes the lines of a cloud, whose points come in the order of their shots, to `take` in that order. Neighbours are
-/// up to `reach` shots away. The light may end up to `ends` shots away; 0 if shots are coarser than the sheet.
+/// Passes the lines of a cloud, whose points come in the order of their shots, to `take` in that order.
 pub(super) fn lines(
     cloud: &dyn PointSource,
     shots: &Shots,
-    reach: u32,
-    ends: u32,
+    neighbours: Neighbours,
     take: &mut dyn FnMut(Pulled) -> Result<()>,
 ) -> Result<()> {
-    let within = reach.max(ends);
-    // The lines within the reach of those that were not passed on yet, and the number of those before them.
+    let within = neighbours.within();
+    // The lines near those that were not passed on yet, and the number of those before them.
     let (mut near, mut done): (VecDeque<Arc<Line>>, usize) = (VecDeque::new(), 0);
     let mut pass = |near: &mut VecDeque<Arc<Line>>, upto: u64| -> Result<()> {
         while near.get(done).is_some_and(|line| u64::from(line.shot) + u64::from(within) <= upto) {
-            take(near[done].clone().pulled(near, reach, ends))?;
+            take(near[done].clone().pulled(near, neighbours))?;
             done += 1;
             while near.len() > done && near[0].shot + within < near[done].shot {
                 near.pop_front();

@@ -3,7 +3,7 @@
 //! Frame and unit: the cloud's frame, mm; docs/math.md, Sheets that are thick.
 
 use super::super::slope::{Slope, slope};
-use super::lines::{Pull, Pulled, lines, nearest};
+use super::lines::{Neighbours, Pull, Pulled, least_way, lines, nearest};
 use crate::fault::Result;
 use crate::scan::{CloudPoint, PointSource, Shots};
 use crate::solve::robust_scale;
@@ -66,10 +66,8 @@ pub struct Thick {
     /// Remaining scatter of the points about that effect, as a variance of the sheet, mm².
     left: f64,
     quiet: Quiet,
-    /// Number of shots to the neighbours that showed it.
-    reach: u32,
-    /// Number of shots to the points that they were compared with.
-    apart: u32,
+    /// The neighbours that showed it.
+    near: Neighbours,
     /// Mean square of what is left of the comparisons, in their stated deviations; edges are clamped.
     rest: f64,
 }
@@ -105,7 +103,9 @@ impl Thick {
     /// show that brightness shifts its points. Where shots are finer than the sheet, the brightness hardly changes from
     /// one to the next, and what does is noise: of neighbours farther away those count that leave the least.
     pub fn of(cloud: &dyn PointSource, shots: &Shots) -> Result<Option<Thick>> {
-        let (adjacent, far, noise) = Thick::by(cloud, shots, 1, 1, UNCHANGED)?;
+        let least_way = least_way(cloud, shots)?;
+        let adjacent = Neighbours { reach: 1, ends: 0, least_way };
+        let (adjacent, far, noise) = Thick::by(cloud, shots, adjacent, 1, UNCHANGED)?;
         let powers = || (0..).map(|k| 1 << k).take_while(|reach| *reach <= FARTHEST && f64::from(*reach) <= far);
         let apart = powers().last().unwrap_or(1);
         if apart == 1 {
@@ -114,7 +114,8 @@ impl Thick {
         let mut best: Option<Thick> = None;
         for reach in powers() {
             let most = UNCHANGED.max(SPECKLE * noise / (nearest(reach).count() as f64).sqrt());
-            let thick = Thick::by(cloud, shots, reach, apart, most)?.0;
+            let near = Neighbours { reach, ends: reach + apart, least_way };
+            let thick = Thick::by(cloud, shots, near, apart, most)?.0;
             let rest = |thick: &Option<Thick>| thick.map_or(f64::INFINITY, |thick| thick.rest);
             if rest(&thick) < rest(&best) {
                 best = thick;
@@ -123,20 +124,20 @@ impl Thick {
         Ok(best)
     }
 
-    /// What neighbours up to `reach` shots away show by comparisons with points `apart` shots away, where `most` bounds
-    /// the changes that count as noise; how many shots away neighbours may be; and the noise of a change. A dip has
-    /// the noise of three independent lights where a change has that of one.
+    /// What neighbours show by comparisons with points `apart` shots away, where `most` bounds the changes that count as
+    /// noise; how many shots away neighbours may be; and the noise of a change. A dip has the noise of three
+    /// independent lights where a change has that of one.
     fn by(
         cloud: &dyn PointSource,
         shots: &Shots,
-        reach: u32,
+        neighbours: Neighbours,
         apart: u32,
         most: f64,
     ) -> Result<(Option<Thick>, f64, f64)> {
         let (mut all, mut every, mut seen) = (Vec::new(), 1, 0_usize);
         let (mut near, mut far): (VecDeque<Pulled>, Vec<f64>) = (VecDeque::new(), Vec::new());
         let apart = apart as usize;
-        lines(cloud, shots, reach, ends_of(reach, apart as u32), &mut |line| {
+        lines(cloud, shots, neighbours, &mut |line| {
             far.extend(line.far);
             near.push_back(line);
             if near.len() == 2 * apart + 1 {
@@ -168,11 +169,11 @@ impl Thick {
         };
         let (change, dip) = (scale(|p| p.change), scale(|p| p.dip));
         let quiet = Quiet { change: (SPECKLE * change).min(most), dip: (SPECKLE * dip).min(most) };
-        Ok((Thick::shown(&all, [reach, apart as u32], quiet), far, change.min(dip / 3f64.sqrt())))
+        Ok((Thick::shown(&all, neighbours, quiet), far, change.min(dip / 3f64.sqrt())))
     }
 
     /// What comparisons show.
-    fn shown(all: &[Between], [reach, apart]: [u32; 2], quiet: Quiet) -> Option<Thick> {
+    fn shown(all: &[Between], near: Neighbours, quiet: Quiet) -> Option<Thick> {
         let pulls = |b: &Between| b.parts.iter().map(|p| quiet.change_of(p.change) * p.by).sum::<f64>();
         let pairs: Vec<[f64; 2]> = all.iter().map(|b| [-pulls(b), b.beyond]).collect();
         let square = slope(&pairs).filter(Slope::sure)?;
@@ -182,7 +183,7 @@ impl Thick {
         let left = left(&rests, square.is);
         let over = rests.iter().map(|[_, rest, stated]| (rest * rest / stated).min(EDGE * EDGE));
         let rest = over.sum::<f64>() / rests.len() as f64;
-        Some(Thick { square, left, quiet, reach, apart, rest })
+        Some(Thick { square, left, quiet, near, rest })
     }
 
     /// Passes the corrected points to `take`, line by line in their order.
@@ -193,7 +194,7 @@ impl Thick {
         take: &mut dyn FnMut(&[CloudPoint]) -> Result<()>,
     ) -> Result<SheetFound> {
         let (mut moved, mut points, mut all) = (0_u64, Vec::new(), 0_u64);
-        lines(cloud, shots, self.reach, ends_of(self.reach, self.apart), &mut |Pulled { line, pulls, .. }| {
+        lines(cloud, shots, self.near, &mut |Pulled { line, pulls, .. }| {
             points.clear();
             for (p, Pull { change, dip, per }) in line.points.iter().zip(&pulls) {
                 let by = per * (self.quiet.change_of(*change) * self.square.is);
@@ -225,11 +226,6 @@ impl Quiet {
     fn unsure(&self, change: f64, dip: f64) -> f64 {
         self.change_of(change).hypot(beyond(dip, self.dip))
     }
-}
-
-/// How far away the light's end is looked for, if points are compared with those that many shots away.
-fn ends_of(reach: u32, apart: u32) -> u32 {
-    if apart > 1 { reach + apart } else { 0 }
 }
 
 /// Soft threshold: 0 within `size`, the number itself beyond twice `size`, and linear between the two. It has no
@@ -304,6 +300,8 @@ mod tests {
     struct Scene {
         shots: u32,
         along: Along,
+        /// Number of steps that the camera has gone at a shot.
+        gone: fn(u32) -> f64,
         /// Distance from shot to shot, mm, and rotation of camera and sheet about the vertical, rad.
         step: f64,
         turn: f64,
@@ -326,6 +324,7 @@ mod tests {
     const PRINTED: Scene = Scene {
         shots: 60,
         along: Along::U,
+        gone: f64::from,
         step: 0.25,
         turn: 0.0,
         thick: 0.1,
@@ -348,7 +347,7 @@ mod tests {
             let mut noise = Noise(seed);
             let (mut cloud, mut places) = (Vec::new(), Vec::new());
             for shot in 0..self.shots {
-                let k = f64::from(shot);
+                let k = (self.gone)(shot);
                 let turned = exp(&(Vec3::z() * (self.turn * k))) * exp(&(Vec3::x() * std::f64::consts::PI));
                 let place: Rigid<Base, Camera> = Rigid::new(turned, Vec3::new(0.0, self.step * k, 150.0));
                 let laser = (self.flicker * noise.normal()).exp();
@@ -446,6 +445,35 @@ mod tests {
             assert!(after < 0.7 * before, "{name}: {before} -> {after}");
             let ratio = found.thickness_mm / scene.thick;
             assert!((0.7..1.6).contains(&ratio), "{name}: {found:?}");
+        }
+    }
+
+    /// Shots of a camera that stands show no slope of the light. They neither throw points far off nor hide the effect.
+    #[test]
+    fn a_camera_that_stands_ruins_nothing() {
+        let stands: [(&str, fn(u32) -> f64, f64); 6] = [
+            ("one picture more", |k| f64::from(k - u32::from(k > 20)), 0.7),
+            ("four", |k| f64::from(k.min(20) + k.saturating_sub(24)), 0.7),
+            ("a third of the scan", |k| f64::from(k.min(20) + k.saturating_sub(40)), 0.9),
+            ("at the start and the end", |k| f64::from(k.clamp(8, 50)), 0.8),
+            (
+                "trembling by 0.01 of a step",
+                |k| f64::from(k.min(20) + k.saturating_sub(24)) + 0.01 * f64::from(k % 3),
+                0.7,
+            ),
+            (
+                "a slow stretch",
+                |k| f64::from(k.min(20)) + 0.1 * f64::from(k.clamp(20, 40) - 20) + f64::from(k.max(40) - 40),
+                0.7,
+            ),
+        ];
+        for (name, gone, left) in stands {
+            let scene = Scene { gone, ..PRINTED };
+            let (found, before, after) = scene.refined(7);
+            let found = found.unwrap_or_else(|| panic!("{name}: nothing is found"));
+            println!("{name}: {found}; {before:.4} -> {after:.4} mm");
+            assert!(after < left * before, "{name}: {before} -> {after}");
+            assert!((0.7..1.6).contains(&(found.thickness_mm / scene.thick)), "{name}: {found:?}");
         }
     }
 
