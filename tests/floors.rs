@@ -128,6 +128,7 @@ const HOMES: &[(&str, &str)] = &[
     ("rumqttc", "web"),
     ("rust_embed", "web"),
     ("saphyr_parser", "files"),
+    ("schemars", "web"),
     ("signal_hook", "cli"),
     ("tiff", "raster"),
     ("tokio", "web"),

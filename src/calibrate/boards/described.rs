@@ -77,6 +77,14 @@ impl Order {
     /// The markers on the board by their pixels, and their rms distance from their places, both in pitches.
     fn laid(&self, seen: &[Marker]) -> Option<(nalgebra::Matrix3<f64>, f64)> {
         let places: Vec<Vec2> = seen.iter().map(|m| self.place(m.id)).collect();
+        // With fewer than two places beside a row or a column, a homography fits to anything.
+        let beside = |axis: usize| {
+            let others = |p: &Vec2| places.iter().filter(|q| q[axis] != p[axis]).count();
+            places.iter().map(others).min().unwrap_or(0)
+        };
+        if beside(0).min(beside(1)) < 2 {
+            return None;
+        }
         let pixels: Vec<Vec2> = seen.iter().map(Marker::centre).collect();
         let h = homography(&pixels, &places)?;
         let off = pixels.iter().zip(&places).map(|(c, p)| (apply(&h, c) - p).norm_squared()).sum::<f64>();
@@ -162,9 +170,9 @@ fn order_fault(board: &BoardSpec, [c, r]: [usize; 2], stated: &Order, meant: &Or
         } else {
             format!("count the printed board's columns and rows, and state \"{field}\": [{n}, ROWS]")
         };
-        let fault =
-            Fault::refused(format!("{read}: they lie as on a board with {n} columns, the described one has {c}"));
-        return fault.cause(WRONG_SIZE).next(next);
+        return Fault::refused(format!("{read}: they lie as on a board with {n} columns, the described one has {c}"))
+            .cause(WRONG_SIZE)
+            .next(next);
     }
     if meant.white != stated.white {
         let colour = if meant.white == Some(true) { "white" } else { "black" };

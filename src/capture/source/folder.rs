@@ -72,7 +72,11 @@ impl FolderCamera {
                 camera.first = Some(first);
                 Ok(camera)
             }
-            Event::Incomplete { why, .. } => Err(camera.spoilt.unwrap_or_else(|| Fault::input(why))),
+            Event::Incomplete { why, .. } => Err(camera.spoilt.unwrap_or_else(|| {
+                Fault::input(why)
+                    .cause("the other program writes another format, or was stopped while it wrote")
+                    .next("let it write PNG, TIFF, PGM, BMP or JPEG, or take the file out of the folder")
+            })),
             _ => Err(Fault::input(format!("{}: no new picture within {} s", folder.display(), patience.as_secs()))
                 .cause("the other program writes elsewhere, or is not running")
                 .next("start it, or give the folder that it fills")),

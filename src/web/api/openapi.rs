@@ -47,9 +47,12 @@ fn reference(message: &str) -> String {
     format!("#/components/schemas/{message}")
 }
 
+fn parameter(name: &str, at: &str, required: bool, schema: Value) -> Value {
+    json!({ "name": name, "in": at, "required": required, "schema": schema })
+}
+
 fn operation(r: &Route, schemas: &Map<String, Value>) -> Value {
     let names = r.path.split('/').filter_map(|w| w.strip_prefix('{')?.strip_suffix('}'));
-    let parameter = |name: &str, at: &str, required: bool, schema: Value| json!({ "name": name, "in": at, "required": required, "schema": schema });
     let string = || json!({ "type": "string" });
     let mut parameters: Vec<Value> =
         names.map(|n| parameter(n.trim_start_matches('*'), "path", true, string())).collect();
@@ -59,7 +62,7 @@ fn operation(r: &Route, schemas: &Map<String, Value>) -> Value {
         let properties = schemas[message]["properties"].as_object().expect("a query has named values");
         parameters.extend(properties.iter().map(|(k, schema)| parameter(k, "query", needs(k), schema.clone())));
     }
-    if r.lease {
+    if r.lease || r.path == "/lease" {
         parameters.push(parameter("X-Sheetlight-Tab", "header", true, string()));
     }
     let (kind, schema) = match r.gives {
@@ -78,12 +81,14 @@ fn operation(r: &Route, schemas: &Map<String, Value>) -> Value {
         "operationId": name(r),
         "summary": r.does,
         "parameters": parameters,
-        "responses": {
-            "200": { "description": "done", "content": { kind: { "schema": schema } } },
-            "4XX": fault,
-            "5XX": fault,
-        },
+        "responses": { "4XX": fault, "5XX": fault },
     });
+    for status in r.answers {
+        out["responses"][status.to_string()] = match status {
+            204 => json!({ "description": "none yet" }),
+            _ => json!({ "description": "done", "content": { kind: { "schema": schema } } }),
+        };
+    }
     if !r.takes.is_empty() && !r.takes.starts_with('?') {
         out["requestBody"] = json!({
             "required": true,

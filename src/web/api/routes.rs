@@ -23,6 +23,8 @@ pub struct Route {
     pub gives: &'static str,
     /// True: only the tab that operates may call it.
     pub lease: bool,
+    /// Status of the answer; of that without a body too, if there may be none.
+    pub answers: &'static [u16],
     pub(super) handler: MethodRouter<Arc<Screen>>,
 }
 
@@ -32,12 +34,16 @@ fn route(
     (takes, gives): (&'static str, &'static str),
     handler: MethodRouter<Arc<Screen>>,
 ) -> Route {
-    Route { method, path, does, takes, gives, lease: false, handler }
+    Route { method, path, does, takes, gives, lease: false, answers: &[200], handler }
 }
 
 impl Route {
     fn leased(self) -> Route {
         Route { lease: true, ..self }
+    }
+
+    fn answering(self, answers: &'static [u16]) -> Route {
+        Route { answers, ..self }
     }
 }
 
@@ -175,7 +181,8 @@ fn of_camera() -> Vec<Route> {
             "The camera's newest picture other than the one of number after=, with its peaks; 204: none yet",
             ("", BYTES),
             get(camera::newest),
-        ),
+        )
+        .answering(&[200, 204]),
     ]
 }
 
@@ -234,7 +241,7 @@ fn of_recipes() -> Vec<Route> {
 fn of_jobs() -> Vec<Route> {
     vec![
         route(("GET", "/jobs"), "Jobs, newest first", ("", "Job[]"), get(jobs::list)),
-        route(("POST", "/jobs"), "Order a procedure", ("Order", "Job"), post(jobs::order)).leased(),
+        route(("POST", "/jobs"), "Order a procedure", ("Order", "Job"), post(jobs::order)).leased().answering(&[202]),
         route(("GET", "/jobs/{id}"), "One job", ("", "Job"), get(jobs::get)),
         route(("DELETE", "/jobs/{id}"), "Take a job and its files away", ("", ""), delete(jobs::remove)).leased(),
         route(

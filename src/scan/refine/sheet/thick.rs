@@ -124,8 +124,8 @@ impl Thick {
         Ok(best)
     }
 
-    /// What neighbours show by comparisons with points `apart` shots away, where `most` bounds the changes that count as
-    /// noise; how many shots away neighbours may be; and the noise of a change. A dip has the noise of three
+    /// What neighbours show by comparisons with points `apart` shots away, where `most` bounds the changes that count
+    /// as noise; how many shots away neighbours may be; and the noise of a change. A dip has the noise of three
     /// independent lights where a change has that of one.
     fn by(
         cloud: &dyn PointSource,
