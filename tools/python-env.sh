@@ -9,8 +9,8 @@ folder=$1 set=$2
 case $set in
   test) packages="numpy scipy libigl maturin==1.* mypy prometheus-client pytest" ;;
   files) packages="duckdb laspy[lazrs] matplotlib mcap mcap-ros2-support opencv-contrib-python-headless==4.14.* pyarrow"
-    packages="$packages pye57 asyncua==2.1.* eclipse-zenoh==1.* openapi-python-client==0.29.* paho-mqtt==2.*"
-    packages="$packages pymodbus==3.16.* pypcd4 rosbags tifffile trimesh xarray xxhash" ;;
+    packages="$packages pye57 asyncua==2.1.* eclipse-zenoh==1.* paho-mqtt==2.* pymodbus==3.16.* pypcd4 rosbags"
+    packages="$packages tifffile trimesh xarray xxhash openapi-python-client==0.29.*;python_version>='3.11'" ;;
   genicam) packages="harvesters==1.4.* numpy" ;;
   peers) packages="numpy scipy numba opencv-contrib-python-headless==4.14.*" ;;
   *) echo "python-env.sh: unknown set '$set': test, files, genicam or peers" >&2; exit 2 ;;

@@ -212,7 +212,7 @@ fn more_points_than_the_header_counts_are_refused() {
         let less = less.replace("POINTS 1200", "POINTS 1000");
         let fault = read_foreign(&[less.as_bytes(), &whole[head..]].concat()).unwrap_err();
         assert!(fault.what.contains("1200 points or more, its header counts 1000"), "{data}: {fault}");
-        // An end of line behind the points is none.
+        // An empty line behind the last point is not a further point.
         assert!(read_foreign(&[&whole[..], b"\n"].concat()).is_ok(), "{data}");
     }
     let ply = |kind: &str, count: usize, xyz: &str, after: &str, body: &[u8]| {

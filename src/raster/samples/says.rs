@@ -33,6 +33,7 @@ const UNITS: &[(f64, &[&str])] = &[
     (1e-3, &["um", "µm", "μm", "\\u00b5m", "micron", "micrometre", "micrometer"]),
     (1.0, &["mm", "millimetre", "millimeter"]),
     (10.0, &["cm", "centimetre", "centimeter"]),
+    (100.0, &["dm", "decimetre", "decimeter"]),
     (25.4, &["in", "inch", "inche"]),
     (304.8, &["ft", "foot", "feet"]),
     (1000.0, &["m", "metre", "meter"]),

@@ -180,7 +180,7 @@ impl BoardSpec {
         self.not_metres(*border)
     }
 
-    /// Refuses a board whose print is narrower than what imported lengths may be: it is described in metres.
+    /// Refuses a board whose print is too narrow for one in millimetres: it is described in metres.
     fn not_metres(&self, border: f64) -> Result<()> {
         let [left, top, right, bottom] = self.outline();
         let across = (right - left).max(bottom - top) - 2.0 * border;
@@ -378,7 +378,7 @@ impl BoardSpec {
     }
 }
 
-/// Least width of a print, mm. Imported lengths below it are taken for metres as well.
+/// Least width of a print, mm.
 const METRES: f64 = 2.0;
 
 /// Distance of two rows of a hexagonal arrangement over the pitch: half the square root of 3.

@@ -115,7 +115,7 @@ pub(super) fn suspects(
 
 /// How many times as far away as the others reach a height must lie to be suspect: a single one, several equal ones.
 const APART: [f64; 2] = [3.0, 0.5];
-/// So many equal heights are a surface.
+/// From this number of equal heights on they are taken for a surface, not for a value that marks missing pixels.
 const SURFACE: usize = 8;
 
 /// The lowest or the highest height, if it is far from all others: its number, and the range of the others.

@@ -45,7 +45,7 @@ pub(super) fn unit_in(comment: &str) -> Option<(f64, String)> {
     let words = rest.split(|c: char| c.is_whitespace() || ":=,;()[]\"'".contains(c));
     let words: Vec<&str> = words.filter(|w| !w.is_empty()).take(4).collect();
     let factor = words.iter().find_map(|w| w.parse::<f64>().ok()).unwrap_or(1.0);
-    // "in" is mostly no inch.
+    // "in" is mostly the preposition.
     let unit = words.iter().filter(|w| **w != "in").chain(words.iter().filter(|_| words.len() == 1));
     let mm = unit.into_iter().find_map(|w| unit_mm(w)).filter(|_| alone)? * factor;
     (mm.is_finite() && mm > 0.0).then(|| said(mm))

@@ -4,6 +4,7 @@
 
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Rigid};
+use crate::raster::unit_mm;
 use serde_json::{Map, Value};
 
 const UNITS: [&str; 5] = ["unit", "units", "length_unit", "length_units", "units_length"];
@@ -15,12 +16,8 @@ const LENGTHS: [&str; 4] = ["flange_T_camera", "base_T_camera", "laser_plane_cam
 const FRAMES: [&str; 11] =
     ["flange", "base", "tool", "tool0", "tcp", "gripper", "hand", "wrist", "ee", "end_effector", "effector"];
 const CAMERA: [&str; 4] = ["camera", "cam", "cam0", "sensor"];
-/// Other words of a unit than those of lengths.
+/// Words of a unit of something other than a length.
 const ANGLES: [&str; 7] = ["deg", "degree", "degrees", "rad", "radian", "radians", "px"];
-const METRIC: [&str; 16] = [
-    "m", "metre", "metres", "meter", "meters", "cm", "dm", "um", "µm", "μm", "nm", "inch", "inches", "ft", "foot",
-    "feet",
-];
 
 /// Refuses statements that the reader of values would not follow.
 pub fn check(file: &Map<String, Value>) -> Result<()> {
@@ -53,10 +50,10 @@ fn stated<'a>(map: &'a Map<String, Value>, keys: &[&str]) -> impl Iterator<Item 
 fn units(map: &Map<String, Value>) -> Result<()> {
     for (key, value) in stated(map, &UNITS) {
         let words = words(value);
-        let mm = words.iter().any(|w| w == "mm" || w.starts_with("millimet"));
-        let other = words.iter().any(|w| METRIC.contains(&w.as_str()));
+        // "in" is mostly the preposition.
+        let lengths: Vec<f64> = words.iter().filter(|w| *w != "in").filter_map(|w| unit_mm(w)).collect();
         let of_angles = words.iter().all(|w| ANGLES.contains(&w.as_str()));
-        if other || !(mm || of_angles) {
+        if lengths.iter().any(|mm| *mm != 1.0) || !of_angles && lengths.is_empty() {
             return Err(Fault::input(format!("{key} is {value}, lengths are read in mm only"))
                 .cause("another program's file: its lengths would be taken as millimetres")
                 .next("convert the lengths to mm and state \"units\": \"mm\""));
