@@ -1,7 +1,7 @@
 //! Makes a finished scan's report, whether its points are in memory or on disk. Lengths are mm.
 
 use super::options::ScanOptions;
-use super::progress::Checkpoint;
+use super::progress::{Calibrated, Checkpoint};
 use super::refined::Refined;
 use super::report::{FORMAT, HeightMapFigures, ScanReport, Spent};
 use super::seen::Seen;
@@ -19,6 +19,7 @@ pub(super) struct Done<'a> {
     pub source: &'a dyn Source,
     pub scanner: &'a Scanner,
     pub state: Checkpoint,
+    pub calibrated: Option<Calibrated>,
     pub seen: Seen,
     pub delay: Option<Delay>,
     /// Duration from the first shot to the refined cloud.
@@ -77,6 +78,7 @@ impl Done<'_> {
                 .chain(self.source.remarks())
                 .chain(scanner.remark())
                 .chain(state.repeats.remarks())
+                .chain(self.calibrated.and_then(|c| state.depths.remark(&c)))
                 .chain(self.stopped)
                 .collect(),
             files,

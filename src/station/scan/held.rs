@@ -4,7 +4,7 @@
 use super::done::{Done, scanner_for};
 use super::options::ScanOptions;
 use super::products::{FEWEST_OF_A_MAP, figures};
-use super::progress::{Checkpoint, fingerprint_of};
+use super::progress::{Calibrated, Checkpoint, fingerprint_of};
 use super::refined::Refined;
 use super::report::{ScanReport, Spent};
 use super::spread::Spread;
@@ -78,6 +78,7 @@ pub fn scan_held(
     rig.belong_together()?;
     rig.reaches(options.volume.as_ref())?;
     let (mut scanner, mut seen) = scanner_for(rig, &*source, options, options.place.open()?)?;
+    let calibrated = Calibrated::of(rig, &source.pictures())?;
     let total = source.remaining();
     let (mut state, mut gathered, mut ended) = (Checkpoint::new(String::new()), Gathered::default(), false);
     // Fingerprints of the pictures being processed, oldest first.
@@ -101,7 +102,7 @@ pub fn scan_held(
         }
         for profile in if ended { scanner.finish()? } else { scanner.ready()? } {
             gathered.take(&profile)?;
-            state.add(&profile, pictures.pop_front().expect("a picture a profile"));
+            state.add(&profile, pictures.pop_front().expect("a picture a profile"), calibrated.as_ref());
         }
         progress(state.shots, total);
     }
@@ -122,6 +123,7 @@ pub fn scan_held(
         scanner: &scanner,
         shots_of_this_run: state.shots,
         state,
+        calibrated,
         seen,
         delay: None,
         seconds,

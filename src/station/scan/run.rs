@@ -6,7 +6,7 @@
 use super::done::{Done, scanner_for};
 use super::options::ScanOptions;
 use super::overlays::Overlays;
-use super::progress::{Checkpoint, fingerprint_of};
+use super::progress::{Calibrated, Checkpoint, fingerprint_of};
 use super::refined::refine;
 use super::report::{ScanReport, Spent};
 use super::scan_folder::{self, CLOUD_FILE, FORMER_PROGRESS};
@@ -125,6 +125,8 @@ struct Work<'a> {
     cloud: CloudWriter,
     shots: ShotsWriter,
     state: Checkpoint,
+    /// What the points' depths are compared with.
+    calibrated: Option<Calibrated>,
     scanner: Scanner,
     overlays: Overlays,
     seen: Seen,
@@ -173,6 +175,7 @@ impl<'a> Work<'a> {
             cloud,
             shots,
             state,
+            calibrated: Calibrated::of(rig, &source.pictures())?,
             scanner,
             overlays: Overlays::new(part, options.overlays, total)?,
             seen,
@@ -265,7 +268,7 @@ impl<'a> Work<'a> {
             // Points and state are updated together: what is counted here is what a resumed scan has stored.
             self.cloud.append(&profile.points)?;
             self.shots.add(profile.shot, profile.from_camera);
-            self.state.add(profile, picture);
+            self.state.add(profile, picture, self.calibrated.as_ref());
             if self.state.shots.is_multiple_of(CHECKPOINT_SHOTS) {
                 self.save()?;
             }
@@ -303,6 +306,7 @@ impl<'a> Work<'a> {
             scanner: &scanner,
             shots_of_this_run: state.shots - self.first,
             state,
+            calibrated: self.calibrated,
             seen: self.seen,
             delay: self.delays.so_far(),
             seconds,
