@@ -8,6 +8,8 @@
 
 CARGO ?= cargo
 VENV := .venv
+# What is built and tested together: library, program, and what uses the library.
+PARTS := --package sheetlight --package sheetlight-program --package shader-twin --package sheetlight-gentl
 # Where cargo puts what it builds: a person may have set another folder.
 TARGET := $(or $(CARGO_TARGET_DIR),target)
 export XDG_RUNTIME_DIR ?= $(shell mktemp -d /tmp/sheetlight-run.XXXXXX)
@@ -25,11 +27,11 @@ station: vulkan build
 build:
 	$(CARGO) build --release --locked
 
-# All packages at once: so the library has the same features for all of them, and is compiled once. OPC UA and ROS 2
+# All parts at once: so the library has the same features for all of them, and is compiled once. OPC UA and ROS 2
 # have nothing of the library; their tests run the program that was built before.
 test: vulkan python cameras browser lint
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(if $(SHEETLIGHT_REQUIRE_GPU),,SHADER_TWIN_ALLOW_SKIP=1) \
-		$(CARGO) test --locked --package sheetlight --package shader-twin --package sheetlight-gentl -- --show-output
+		$(CARGO) test --locked $(PARTS) -- --show-output
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(CARGO) test --locked --package sheetlight-opcua \
 		--package sheetlight-registers -- --show-output
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(CARGO) test --locked --package sheetlight-ros2 -- --show-output
@@ -45,7 +47,7 @@ book:
 
 lint: pages book
 	if $(CARGO) clippy --version >/dev/null 2>&1; then \
-		$(CARGO) clippy --locked --package sheetlight --package shader-twin --package sheetlight-gentl --all-targets \
+		$(CARGO) clippy --locked $(PARTS) --all-targets \
 			-- -D warnings && \
 		$(CARGO) clippy --locked --package sheetlight-opcua --package sheetlight-registers --all-targets \
 			-- -D warnings && \
@@ -54,7 +56,8 @@ lint: pages book
 	$(CARGO) check --locked --package outside
 	if $(CARGO) clippy --version >/dev/null 2>&1; then \
 		$(CARGO) clippy --locked --package sheetlight-python --features whole -- -D warnings; fi
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --package sheetlight --package shader-twin
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --package sheetlight --package sheetlight-program \
+		--package shader-twin
 
 # The GenTL producer, under the name by which GenICam programs look for it.
 gentl:

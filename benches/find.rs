@@ -95,7 +95,7 @@ fn task(name: &'static str, w: usize, h: usize, kind: Kind, size: f64) -> Task {
         &ModelOptions::default(),
     )
     .expect("a clear outline");
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/find-bench");
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("target/find-bench");
     std::fs::create_dir_all(&folder).expect("target can be written");
     let keep = |what: &str, w: usize, h: usize, pixels: &[u8]| {
         let image = Image::from_u8(w as u32, h as u32, pixels.to_vec());

@@ -39,7 +39,7 @@ fn main() {
 
 /// 500 shots of 640x480, made once.
 fn simulated() -> Result<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/scan-bench");
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("target/scan-bench");
     if !folder.join("scan/meta.json").exists() {
         sheetlight(Command::new(PROGRAM).args(["simulate", "--shots", "500", "--quiet", "--out"]).arg(&folder))?;
     }

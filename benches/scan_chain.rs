@@ -7,7 +7,6 @@ mod common;
 
 use common::median;
 use rayon::prelude::*;
-use sheetlight::bench::{Scene, cpu_seconds, pictures, scan_chain};
 use sheetlight::camera::Intrinsics;
 use sheetlight::fault::{Fault, Result};
 use sheetlight::geometry::{Plane, Vec3};
@@ -19,6 +18,7 @@ use sheetlight::stages::chain::config::ChainConfig;
 use sheetlight::stages::host::Host;
 use sheetlight::stages::peak::{Stripe, noise};
 use sheetlight::stages::stripe::point::{Optics, pose_words};
+use sheetlight_program::bench::{Scene, cpu_seconds, pictures, scan_chain};
 
 /// The program's own.
 #[global_allocator]

@@ -2,7 +2,6 @@
 //! Frame and unit: seconds a shot. What limits each stands beside it and in benches/README.md.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use sheetlight::bench::{Scene, pictures};
 use sheetlight::gpu::Device;
 use sheetlight::raster::Image;
 use sheetlight::scan::grid;
@@ -11,6 +10,7 @@ use sheetlight::stages::chain::batches::Chain;
 use sheetlight::stages::chain::config::ChainConfig;
 use sheetlight::stages::stripe::{hough, skeleton, thin, threshold};
 use sheetlight::stages::{Thinning, ThresholdParams};
+use sheetlight_program::bench::{Scene, pictures};
 
 /// The program's own.
 #[global_allocator]

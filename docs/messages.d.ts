@@ -1,4 +1,4 @@
-// Made from src/web/message by the test `messages`; SHEETLIGHT_WRITE=1 makes it again.
+// Made from program/src/web/message by the test `messages`; SHEETLIGHT_WRITE=1 makes it again.
 
 export type Mode = "live" | "replay" | "simulated";
 

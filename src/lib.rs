@@ -26,11 +26,11 @@
 //! types ([`geometry::Rigid`]). Bad input is a [`fault::Fault`]: what happened with its number and limit, the likely
 //! cause, the next step.
 //!
-//! **Features.** `cli` (default) is the command line with clap and indicatif, and turns all other features on. `bench`
-//! has the measurements of `sheetlight bench`, `gige` the cameras that speak GigE Vision, `folder` makes a folder a
-//! camera, and `cell` is the simulated cell. `pages` writes a scan's `index.html` and the reports of calibrations,
-//! `ros` writes scans as MCAP files with ROS 2 messages. `web` is the operator's screen. A program that uses the
-//! library sets `default-features = false` and chooses what it needs.
+//! **Features.** `gige` has the cameras that speak GigE Vision, and `folder` makes a folder a camera. `pages` writes a
+//! scan's `index.html` and the reports of calibrations, `tables` writes a batch's tables as Parquet files. All four are
+//! on by default; a program that needs none of them sets `default-features = false`.
+//!
+//! The program `sheetlight` with its command line, screen and simulated cell is a package of its own, in `program/`.
 //!
 //! The modules are listed in the order of their floors; each imports only from floors above it in this list
 //! (ARCHITECTURE.md, enforced by tests/floors.rs).
@@ -54,24 +54,11 @@ pub mod robot;
 
 pub mod calibrate;
 pub mod capture;
-#[cfg(feature = "cell")]
-pub mod cell;
 pub mod simulate;
 
 pub mod stages;
 
 pub mod scan;
 
-#[cfg(feature = "bench")]
-pub mod bench;
-
 pub mod find;
 pub mod station;
-
-#[cfg(feature = "ros")]
-pub mod ros;
-#[cfg(feature = "web")]
-pub mod web;
-
-#[cfg(feature = "cli")]
-pub mod cli;

@@ -76,7 +76,7 @@ fn archive() -> &'static Path {
 /// One simulated recording and copies of it, in which the robot reports other places.
 fn make(folder: &Path, count: usize) {
     let at = |name: &str| folder.join(name).to_str().unwrap().to_owned();
-    let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/rigs/paper.toml");
+    let rig = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("data/rigs/paper.toml");
     let (out, rig) = (at("sim"), rig.to_str().unwrap().to_owned());
     done(
         program(["simulate", "--out", &out, "--rig", &rig, "--seed", "3", "--width", "320"]).into_with("--set", "scan"),
@@ -413,7 +413,7 @@ fn a_picture_that_is_cut_refuses_its_recording_unless_it_is_excluded() {
 fn a_refusal_is_a_result_and_the_others_go_on() {
     let dir = tempfile::tempdir().unwrap();
     // Another part's recipe.
-    let recipe = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/recipes/led.toml");
+    let recipe = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("data/recipes/led.toml");
     let run = || {
         let mut command = program(["batch", "--on", "cpu"]);
         command.arg(archive().join("recordings/2")).arg(archive().join("recordings/0")).arg(dir.path().join("none"));

@@ -41,8 +41,8 @@ mod workplace;
 #[path = "cell/worlds.rs"]
 mod worlds;
 
-use sheetlight::cell::{Cell, CellOptions, Served};
 use sheetlight::simulate::SceneSpec;
+use sheetlight_program::cell::{Cell, CellOptions, Served};
 
 /// A cell with the circuit board that ships with the program, `speed` times as fast as ours.
 fn cell(seed: u64, speed: f64) -> Served {

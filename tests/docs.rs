@@ -20,7 +20,12 @@ mod sentences;
 use std::path::{Path, PathBuf};
 
 fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+}
+
+/// Whether a file is a source of the library or of the program.
+fn is_source(name: &str) -> bool {
+    name.starts_with("src/") || name.starts_with("program/src/")
 }
 
 /// The repository's files with one of these endings, by their path from its root.

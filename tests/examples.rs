@@ -41,7 +41,7 @@ fn every_example_does_what_it_says() {
     assert!(said.contains("verdict: good") && said.lines().next().unwrap().starts_with("fx "), "{said}");
     assert!(!said.contains("NaN"), "{said}");
 
-    let recipe = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/recipes/led.toml");
+    let recipe = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("data/recipes/led.toml");
     let said = run("find_part", &[&scan, &recipe, station]);
     assert!(said.contains("insertion [") && scan.join("found.png").exists(), "{said}");
 }

@@ -57,7 +57,7 @@ fn seeds(texts: &[&str]) -> Vec<Vec<u8>> {
 }
 
 fn shipped(folder: &str) -> Vec<Vec<u8>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("data").join(folder);
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("data").join(folder);
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
     files.sort();
     files.iter().map(|f| std::fs::read(f).unwrap()).collect()
@@ -358,7 +358,7 @@ fn pictures() {
     survives("TIFF", vec![tiff.clone()], |b| read_float_tiff(b).map(drop));
     // Files that say something about their own samples, as heights and as light.
     let stated = |names: &[&str]| -> Vec<Vec<u8>> {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/statements");
+        let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("tests/data/statements");
         names.iter().map(|name| std::fs::read(folder.join(name)).expect("a file")).collect()
     };
     let seeds_of = [

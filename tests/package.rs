@@ -16,7 +16,7 @@ fn root() -> &'static Path {
 fn package(arguments: &[&str]) -> String {
     let out = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(root())
-        .args(["package", "--locked", "--offline", "--allow-dirty", "--quiet"])
+        .args(["package", "--package", "sheetlight", "--locked", "--offline", "--allow-dirty", "--quiet"])
         .args(arguments)
         .output()
         .expect("cargo starts");
@@ -97,24 +97,10 @@ fn the_crate_holds_what_builds_and_what_its_readme_leads_to() {
         }
     }
     assert!(taken > 40 && shown > 15, "{taken} files taken in, {shown} named by README.md");
-    // The screen's pages are embedded as a folder.
-    for page in files_under("src/web/pages").into_iter().filter(|p| lacks(p)) {
-        faults.push(format!("{page} is a page of the screen and is not published"));
-    }
     for file in files.iter().filter(|f| f.starts_with("tests/") || f.starts_with('.') && *f != ".cargo_vcs_info.json") {
         faults.push(format!("{file} is no use to who takes the crate"));
     }
     assert!(faults.is_empty(), "\n{}", faults.join("\n"));
-}
-
-fn files_under(folder: &str) -> Vec<String> {
-    let entries = std::fs::read_dir(root().join(folder)).unwrap().map(|e| e.unwrap());
-    let mut out = Vec::new();
-    for entry in entries {
-        let name = format!("{folder}/{}", entry.file_name().to_string_lossy());
-        if entry.file_type().unwrap().is_dir() { out.extend(files_under(&name)) } else { out.push(name) }
-    }
-    out
 }
 
 #[test]
@@ -144,20 +130,31 @@ fn the_manifest_says_what_a_registry_shows() {
     }
 }
 
-/// What serves people, a terminal or a browser is no part of the engine that other programs build on.
-#[test]
-fn the_engine_alone_needs_no_server_no_command_line_and_no_pages() {
+/// The names of the crates that the library is built from, with these features.
+fn built_from(features: &[&str]) -> BTreeSet<String> {
     let out = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .args(["tree", "--locked", "--offline", "--package", "sheetlight", "--no-default-features"])
+        .args(["tree", "--locked", "--offline", "--package", "sheetlight"])
+        .args(features)
         .args(["--edges", "normal", "--prefix", "none", "--format", "{p}"])
         .current_dir(root())
         .output()
         .expect("cargo starts");
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     let text = String::from_utf8(out.stdout).unwrap();
-    let crates: BTreeSet<&str> = text.lines().filter_map(|line| line.split(' ').next()).collect();
+    let crates: BTreeSet<String> = text.lines().filter_map(|line| line.split(' ').next()).map(str::to_owned).collect();
     assert!(crates.contains("wgpu") && crates.contains("nalgebra"), "{text}");
-    for name in ["argon2", "axum", "clap", "maud", "mcap", "notify", "parquet", "rumqttc", "tokio", "ts-rs"] {
-        assert!(!crates.contains(name), "{name}");
+    crates
+}
+
+/// What serves people, a terminal or a browser is no part of the engine that other programs build on.
+#[test]
+fn the_engine_needs_no_server_and_no_command_line_and_alone_no_pages() {
+    let whole = built_from(&[]);
+    for name in ["argon2", "axum", "clap", "indicatif", "mcap", "rumqttc", "rust-embed", "schemars", "ts-rs"] {
+        assert!(!whole.contains(name), "{name}");
+    }
+    let alone = built_from(&["--no-default-features"]);
+    for name in ["maud", "notify", "parquet", "tokio", "viva-genicam"] {
+        assert!(whole.contains(name) && !alone.contains(name), "{name}");
     }
 }

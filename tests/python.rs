@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 use std::time::Instant;
 
 fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
 }
 
 fn python<A: AsRef<OsStr>>(arguments: impl IntoIterator<Item = A>) -> Command {

@@ -22,7 +22,7 @@ use std::process::Command;
 const NOTCH_MM: f64 = 3.0;
 
 fn designs() -> Vec<(String, PathBuf)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/rigs");
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("data/rigs");
     let mut all: Vec<_> = std::fs::read_dir(folder)
         .unwrap()
         .map(|e| e.unwrap().path())
@@ -393,7 +393,7 @@ fn rigs_are_calibrated_scanned_and_searched() {
     if std::env::var_os("UPDATE_RIGS").is_some() {
         assert!(long && only.is_none() && narrow.is_none(), "the table in docs is of all rigs at their own size");
         // What people wrote around the table stays.
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/rigs.md");
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("docs/rigs.md");
         let text = std::fs::read_to_string(&path).unwrap();
         let (begin, end) = ("<!-- tables of tests/rigs.rs -->\n", "<!-- end of tables -->");
         let (before, rest) = text.split_once(begin).expect("the tables begin");

@@ -73,7 +73,7 @@ const WITHIN: [f64; 2] = [0.68, 0.88];
 
 /// One line per cloud whose stated standard deviations are not those of its points.
 fn dishonest(reference: &Path, cloud: &Path, mesh: &Path) -> Vec<String> {
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/common/honest.py");
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/common/honest.py");
     let run = Command::new("python3").arg(script).arg(reference.join("rendered")).args([cloud, mesh]).output();
     let done = run.expect("the scorer runs, so Python is there");
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
@@ -181,7 +181,11 @@ fn scans_under_a_slanted_stripe_meet_their_bars() {
         let out = dir.path().join(set);
         scan(&inputs.join(set), &station, "auto", &out);
         sets.insert(set.into(), serde_json::json!({"cloud": format!("{set}/cloud.ply")}));
-        let recipe = format!("{}/data/recipes/{}.toml", env!("CARGO_MANIFEST_DIR"), set.trim_start_matches("scan_"));
+        let recipe = format!(
+            "{}/data/recipes/{}.toml",
+            concat!(env!("CARGO_MANIFEST_DIR"), "/.."),
+            set.trim_start_matches("scan_")
+        );
         let [from, report] = [out.clone(), out.with_extension("json")].map(|p| p.to_str().unwrap().to_owned());
         sheetlight(&["find", &from, "--recipe", &recipe, "--station", &station, "--out", &report, "--quiet"]);
         let json =

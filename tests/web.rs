@@ -11,7 +11,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 fn source(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join(name)
 }
 
 /// A station that scanned a part of the board that is simulated by default; all of it where pictures for the
@@ -253,7 +253,7 @@ fn own_words(script: &str) -> Vec<String> {
 fn every_text_has_its_translations() {
     let read = own_words(r#"h(t("a (b)"), post("c"), t(x === "d" ? "e" : f), t({ g: "h" }[i]), t(j))"#);
     assert_eq!(read, ["a (b)", "e", "h"]);
-    let pages = source("src/web/pages");
+    let pages = source("program/src/web/pages");
     let table = std::fs::read_to_string(pages.join("base/texts.js")).unwrap();
     // The names of conditions follow as a table of their own (tests/docs/gates.rs).
     let table = table.split("export const GATES").next().unwrap();
@@ -290,9 +290,9 @@ fn same(name: &str, is: &str) {
 
 #[test]
 fn messages_and_routes_are_described_as_they_are() {
-    let messages = sheetlight::web::declarations();
+    let messages = sheetlight_program::web::declarations();
     same("docs/messages.d.ts", &messages);
-    let api = sheetlight::web::openapi();
+    let api = sheetlight_program::web::openapi();
     same("docs/openapi.json", &format!("{}\n", serde_json::to_string_pretty(&api).unwrap()));
     // Every message that is named is described, and operations have names of their own.
     let (mut named, mut operations) = (Vec::new(), Vec::new());

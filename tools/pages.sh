@@ -10,5 +10,5 @@ if ! { command -v npm && npm install --silent --no-audit --no-fund --no-package-
 fi
 mode=${1:---check}
 node_modules/.bin/prettier --config prettier.json --log-level warn "$mode" \
-  "../../src/web/pages/**/*.js" ../../src/station/judge/viewer.js
+  "../../program/src/web/pages/**/*.js" ../../src/station/judge/viewer.js
 node_modules/.bin/tsc --project .

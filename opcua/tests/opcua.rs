@@ -20,7 +20,7 @@ fn skipped(why: &str) {
 #[test]
 fn an_opc_ua_client_starts_and_follows_insertions_that_only_the_screen_confirms() {
     let Some(sheetlight) = sheetlight() else {
-        return skipped("the program sheetlight is not built: cargo build --package sheetlight, or make test");
+        return skipped("the program sheetlight is not built: cargo build --package sheetlight-program, or make test");
     };
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = tempfile::tempdir().unwrap();

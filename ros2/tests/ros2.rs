@@ -26,7 +26,7 @@ static ALONE: Mutex<()> = Mutex::new(());
 fn python(script: &str, words: &[&str]) {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(sheetlight) = sheetlight() else {
-        return skipped("the program sheetlight is not built: cargo build --package sheetlight, or make test");
+        return skipped("the program sheetlight is not built: cargo build --package sheetlight-program, or make test");
     };
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = tempfile::tempdir().unwrap();

@@ -28,9 +28,7 @@ pub use feature::{Feature, Range, Value};
 pub use feed::{Fate, Fed, Feed, FeedOptions, Mode};
 pub use format::{Format, Pictures, RawFormat, RawFrames};
 pub use latency::Latency;
-#[cfg(test)]
-pub use look::PIECES;
-pub use look::{Look, Piece, StripeLook, WANTED, look, look_at};
+pub use look::{Look, PIECES, Piece, StripeLook, WANTED, look, look_at};
 pub use picture::{Event, Numbering, Picture, PictureSource};
 pub use stream::{Stream, Streamed};
 pub use uri::CameraUri;

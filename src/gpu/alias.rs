@@ -20,7 +20,7 @@ struct Memory {
     /// Index in the adapter's list of memory types.
     kind: u32,
     /// The device and the driver that holds its code must outlive the memory. Without this field, scans with an ambient
-    /// picture crashed when they ended (tests/scan/inputs.rs).
+    /// picture crashed when they ended (tests/scan_commands/inputs.rs).
     _owner: wgpu::Device,
 }
 

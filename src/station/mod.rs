@@ -64,9 +64,7 @@ pub use judge::embed::base64;
 pub use judge::figures::Judged;
 pub use judge::parts::{FoundPart, judge_parts};
 pub use judge::points::judge;
-#[cfg(test)]
-pub use output::LIT;
-pub use output::{Output, try_output};
+pub use output::{LIT, Output, try_output};
 pub use range::{Distance, RangeReport, RangeRun, Square, SurfaceFound, measure_range};
 pub use robot::{carried, guarded};
 pub use scan::held::{HeldScan, scan_held};

@@ -198,7 +198,9 @@ fn scenes() {
 fn names() {
     use sheetlight::find::Recipe;
     use sheetlight::simulate::RigSpec;
-    let shipped = |file: &str| std::fs::read_to_string(format!("{}/data/{file}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+    let shipped = |file: &str| {
+        std::fs::read_to_string(format!("{}/data/{file}", concat!(env!("CARGO_MANIFEST_DIR"), "/.."))).unwrap()
+    };
     let (led, rig) = (shipped("recipes/led.toml"), shipped("rigs/paper.toml"));
     let mut cases = Vec::new();
     for (what, name, want) in [

@@ -90,7 +90,7 @@ const READ: [(&str, &str, bool); 32] = [
 fn whatever_lies_where_a_file_is_wanted() {
     let b = Bench::new(3);
     let here = b.dir.path().to_str().unwrap();
-    let led = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/recipes/led.toml");
+    let led = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("data/recipes/led.toml");
     std::fs::copy(led, b.at("led.toml")).unwrap();
     let boards = "# transform: camera_T_board\n# convention: \
                   matrix\nframe,m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23,m30,m31,m32,m33\n\

@@ -13,6 +13,15 @@ fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
+/// The sources of the library and of the program.
+fn all_sources() -> Vec<PathBuf> {
+    let program = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    sources(&program.join("../src"), &mut files);
+    sources(&program.join("src"), &mut files);
+    files
+}
+
 /// Where the bracket that stands first in `text` is closed; what stands in quotes does not count.
 fn closed(text: &str) -> usize {
     let (mut depth, mut quoted, mut escaped) = (0, false, false);
@@ -90,8 +99,7 @@ fn files_threads_and_outputs_are_had_in_one_way() {
         ".spawn(|",
         "println!(",
     ];
-    let mut files = Vec::new();
-    sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut files);
+    let files = all_sources();
     let outside = files.iter().filter(|f| !f.components().any(|c| c.as_os_str() == "files"));
     let wrong: Vec<String> = outside
         .flat_map(|file| {
@@ -111,8 +119,7 @@ fn files_threads_and_outputs_are_had_in_one_way() {
 fn every_fault_has_a_next_step() {
     assert_eq!(without_next("Fault::input(format!(\"a) {x}\")).cause(\"b\")").len(), 1);
     assert_eq!(without_next("Fault::input(format!(\"a) {x}\"))\n    .cause(\"b\")\n    .next(\"c\")").len(), 0);
-    let mut files = Vec::new();
-    sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut files);
+    let files = all_sources();
     let (mut wrong, mut seen) = (Vec::new(), 0);
     for file in files.iter().filter(|f| !f.ends_with("fault/mod.rs") && !only_tested(f)) {
         let text = std::fs::read_to_string(file).unwrap();

@@ -31,7 +31,7 @@ fn inputs() -> &'static Path {
             let mut simulate =
                 vec!["simulate".to_owned(), "--out".into(), at(&format!("sim{n}")), "--seed".into(), seed];
             simulate.extend(["--width", "320", "--quiet", "--set", "scan"].map(str::to_owned));
-            let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/rigs/paper.toml");
+            let rig = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("data/rigs/paper.toml");
             simulate.extend(["--rig".to_owned(), rig.to_str().unwrap().into()]);
             run(&simulate);
             let mut scan =

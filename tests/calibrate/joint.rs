@@ -8,7 +8,6 @@ mod auto;
 mod budget;
 mod choice;
 mod derivatives;
-mod recordings;
 mod stations;
 mod wrong;
 

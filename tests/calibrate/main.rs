@@ -6,21 +6,15 @@
 mod common;
 
 mod axis_judge;
-mod bad_input;
 mod ball_judge;
 mod camera_judge;
-mod commands;
 mod foreign_boards;
-mod foreign_cameras;
-mod guide;
 mod hand_eye_judge;
 mod joint;
 mod laser_plane_judge;
 mod legacy_charuco;
 mod mixed_sets;
-mod notations;
 mod photographs;
 mod plane_judge;
 mod pointer_judge;
 mod second_look;
-mod second_look_commands;

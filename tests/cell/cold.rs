@@ -15,7 +15,6 @@ use sheetlight::calibrate::limits::Asked;
 use sheetlight::camera::Readout;
 use sheetlight::capture::PictureSource;
 use sheetlight::capture::source::cell::CellCamera;
-use sheetlight::cell::{Cell, CellOptions, Event, Served, Vs060};
 use sheetlight::fault::Result;
 use sheetlight::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Vec3, exp, log};
 use sheetlight::recording::{BoardSpec, Recording};
@@ -28,6 +27,7 @@ use sheetlight::station::{
     ArmCell, AutoResult, AutoRun, HeadSpec, JointRun, Settings, ToolSpec, WorkingVolume, calibrate_auto, guarded,
     store_joint,
 };
+use sheetlight_program::cell::{Cell, CellOptions, Event, Served, Vs060};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -205,7 +205,7 @@ impl Cold {
         let before = cell.collisions();
         let options = JobOptions {
             station: self.station.clone(),
-            recipe: Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("data/recipes/{part}.toml")),
+            recipe: Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join(format!("data/recipes/{part}.toml")),
             out: self.dir.path().join(format!("{part}{seed}")),
             robot: Convention::Denso,
             place: Where::Cpu,
@@ -348,7 +348,8 @@ fn cold_cells_calibrate_themselves_and_insert() {
 fn cold_cells_of_other_kinds_calibrate_themselves() {
     let Some(seeds) = seeds() else { return };
     let rig = |name: &str| {
-        RigSpec::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("data/rigs/{name}.toml"))).unwrap()
+        RigSpec::load(&Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join(format!("data/rigs/{name}.toml")))
+            .unwrap()
     };
     let paper = |seed| options(RigSpec::paper(), seed, 10.0);
     type Kind<'a> = (&'a str, f64, f64, &'a dyn Fn(u64) -> CellOptions);

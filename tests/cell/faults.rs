@@ -6,9 +6,9 @@
 use super::workplace::{DARK, Set, dark_within, scene, set};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
-use sheetlight::cell::{Entry, Event};
 use sheetlight::geometry::{Base, Flange, Rigid};
 use sheetlight::station::job::{JobState, Phase, Resumes};
+use sheetlight_program::cell::{Entry, Event};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::Ordering::SeqCst;

@@ -5,9 +5,9 @@
 
 use super::speeds::ROOM;
 use super::workplace::{Yes, scene, set, set_but};
-use sheetlight::cell::Insertion;
 use sheetlight::station::Settings;
 use sheetlight::station::job::{JobReport, JobState, Outcome, Phase};
+use sheetlight_program::cell::Insertion;
 
 /// Runs a job to its end; the insertion as the truth judges it.
 fn inserted(part: &str, seed: u64, tilt_deg: f64, sweep_mm: f64) -> (JobReport, Option<Insertion>, usize, Vec<String>) {

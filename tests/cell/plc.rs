@@ -34,7 +34,7 @@ fn codes(fault: Fault) -> &'static [u64] {
 
 /// A server of the cell's station with a person and a PLC, as a script; files grow to `most_kb` at most.
 fn begin(set: &Set, most_kb: Option<u32>) -> Child {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
     let recipes = set.station.join("recipes");
     std::fs::create_dir_all(&recipes).unwrap();
     let coarse = include_str!("../../data/recipes/osc.toml").replace("cell_mm = 0.5", "cell_mm = 0.8");

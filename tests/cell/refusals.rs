@@ -14,7 +14,7 @@ use std::process::{Command, Stdio};
 /// `sheetlight job` with these addresses: exit code and stderr.
 fn job(set: &Set, robot: &str, camera: &str) -> (i32, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_sheetlight"));
-    let recipe = concat!(env!("CARGO_MANIFEST_DIR"), "/data/recipes/osc.toml");
+    let recipe = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/recipes/osc.toml");
     command.args(["job", "--robot", robot, "--camera", camera, "--recipe", recipe, "--on", "cpu", "--sweep", "10"]);
     command.args(["--allow-motion", "--yes"]).arg("--station").arg(&set.station);
     command.arg("--out").arg(tempfile::tempdir_in(set.dir.path()).unwrap().keep());

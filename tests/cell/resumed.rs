@@ -112,7 +112,7 @@ fn former_files_of_jobs_go_on() {
 /// What the documents say of how far above the part a recipe keeps the tool.
 #[test]
 fn the_documents_name_the_clearance() {
-    let here = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let here = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
     let recipe = Recipe::load(&here.join("data/recipes/osc.toml")).unwrap();
     // Drawn on one surface: what is left is the clearance.
     let clear = recipe.insertion.least_above_mm(&recipe.drawing());

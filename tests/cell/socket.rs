@@ -247,7 +247,7 @@ fn who_says_nothing_more_is_told_so_and_left() {
 /// What the programs in docs/robots send is understood, and each sends all that a scan needs.
 #[test]
 fn the_programs_in_the_documents_speak_the_protocol() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/robots");
+    let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("docs/robots");
     let (mut programs, mut answers) = (0, 0);
     for entry in std::fs::read_dir(&folder).unwrap() {
         let path = entry.unwrap().path();

@@ -4,8 +4,8 @@
 use super::workplace::bare;
 use sheetlight::arm::rules::{Carried, Confirmation, Guard, Limits, MotionLog, Plan, Space, Straight};
 use sheetlight::arm::{Motion, Way};
-use sheetlight::cell::{Cell, Served};
 use sheetlight::geometry::{Rigid, Vec3, exp};
+use sheetlight_program::cell::{Cell, Served};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 use std::thread::JoinHandle;

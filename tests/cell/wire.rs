@@ -7,13 +7,13 @@ use crate::common::tries::{judged, tries};
 use sheetlight::arm::{Mode, Reach};
 use sheetlight::bcap::{Call, Client, ClientOptions, Network, Variant};
 use sheetlight::capture::{CameraUri, Event};
-use sheetlight::cell::Event as Happened;
 use sheetlight::geometry::{Rigid, Vec3};
+use sheetlight_program::cell::Event as Happened;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 use std::time::Duration;
 
-fn moved(served: &sheetlight::cell::Served) -> usize {
+fn moved(served: &sheetlight_program::cell::Served) -> usize {
     served.cell.moves()
 }
 
@@ -65,7 +65,7 @@ fn the_link_reads_asks_and_gets_through_what_a_wire_does() {
     assert!(arm.signal(24).unwrap() && !arm.signal(25).unwrap());
     // Interim replies, foreign serials, pieces of one byte, two answers at once, delay.
     let faults = &served.faults;
-    let wires: [fn(&sheetlight::cell::Faults); 5] = [
+    let wires: [fn(&sheetlight_program::cell::Faults); 5] = [
         |f| f.piece.store(1, SeqCst),
         |f| f.foreign.store(true, SeqCst),
         |f| f.interim.store(3, SeqCst),

@@ -5,7 +5,6 @@
 use super::speeds::{HEAD, Speeds};
 use sheetlight::arm::rules::{Carried, Confirmation, Guard, Limits, Space};
 use sheetlight::capture::source::cell::CellCamera;
-use sheetlight::cell::{Cell, CellOptions, Event, Served};
 use sheetlight::fault::Result;
 use sheetlight::geometry::Vec3;
 use sheetlight::robot::Convention;
@@ -13,6 +12,7 @@ use sheetlight::scan::Where;
 use sheetlight::simulate::SceneSpec;
 use sheetlight::station::job::{Ask, Job, JobOptions, JobReport, Operator};
 use sheetlight::station::{HeadSpec, Settings, ToolSpec, guarded};
+use sheetlight_program::cell::{Cell, CellOptions, Event, Served};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -141,7 +141,7 @@ impl Set {
     pub fn options(&self, recipe: &str, out: &str, sweep_mm: f64) -> JobOptions {
         JobOptions {
             station: self.station.clone(),
-            recipe: Path::new(env!("CARGO_MANIFEST_DIR")).join("data/recipes").join(recipe),
+            recipe: Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("data/recipes").join(recipe),
             out: self.dir.path().join(out),
             robot: Convention::Denso,
             place: Where::Cpu,

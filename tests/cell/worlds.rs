@@ -3,9 +3,9 @@
 //! Frame and unit: mm, degrees.
 
 use super::workplace::{Set, Yes, scene, set_but};
-use sheetlight::cell::Event;
 use sheetlight::simulate::{CutSpec, Material, SceneSpec, ShapeSpec, SolidSpec};
 use sheetlight::station::job::{JobReport, Outcome};
+use sheetlight_program::cell::Event;
 
 /// A world that is not as the recipe of the oscillator has it.
 struct World {

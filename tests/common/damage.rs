@@ -88,7 +88,7 @@ const HANGS: Duration = Duration::from_secs(120);
 const MOST_MB: u64 = 512;
 
 /// Where what once failed is kept, a folder a parser; and where what fails now is put, to be moved there.
-const CORPUS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/corpus");
+const CORPUS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/corpus");
 const FAILED: &str = concat!(env!("CARGO_TARGET_TMPDIR"), "/fuzz");
 
 /// What once failed of a parser.

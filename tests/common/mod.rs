@@ -78,16 +78,24 @@ pub fn score(reference: &Path, estimate: &Path, truth: &Path) -> Option<serde_js
     }
 }
 
+/// The program under test, which cargo builds for the tests of its package.
+pub fn program() -> &'static str {
+    let Some(program) = option_env!("CARGO_BIN_EXE_sheetlight") else {
+        panic!("only tests of the package sheetlight-program have a program");
+    };
+    program
+}
+
 /// Runs the program; gives its stdout, or panics with its stderr.
 pub fn sheetlight(args: &[&str]) -> String {
-    let done = Command::new(env!("CARGO_BIN_EXE_sheetlight")).args(args).output().expect("the program starts");
+    let done = Command::new(program()).args(args).output().expect("the program starts");
     assert!(done.status.success(), "sheetlight {}\n{}", args.join(" "), String::from_utf8_lossy(&done.stderr));
     String::from_utf8(done.stdout).expect("text")
 }
 
 /// Runs the program and expects it to fail; gives its exit code and stderr.
 pub fn sheetlight_fails(args: &[&str]) -> (i32, String) {
-    let done = Command::new(env!("CARGO_BIN_EXE_sheetlight")).args(args).output().expect("the program starts");
+    let done = Command::new(program()).args(args).output().expect("the program starts");
     assert!(!done.status.success(), "sheetlight {} succeeded", args.join(" "));
     (done.status.code().expect("an exit code"), String::from_utf8_lossy(&done.stderr).into_owned())
 }

@@ -2,7 +2,7 @@
 //!
 //! A block ```` ```console ```` has commands behind `$ `, each followed by its output. A line `...` stands for any
 //! lines, `...` at another place for any text. Times and speeds are not compared. A block ```` ```console not-run ````
-//! needs a camera, a robot, a second terminal or a build; it is counted here, and src/cli/commands.rs parses it.
+//! needs a camera, a robot, a second terminal or a build; it is counted here, and `cli::commands` parses it.
 
 use super::markdown::{Fence, Markdown};
 use std::path::Path;

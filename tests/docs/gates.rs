@@ -26,7 +26,7 @@ fn in_sources(folder: &str) -> BTreeSet<String> {
 
 /// Rows of the table: a name and its texts.
 fn in_table() -> Vec<Vec<String>> {
-    let text = std::fs::read_to_string(super::root().join("src/web/pages/base/texts.js")).unwrap();
+    let text = std::fs::read_to_string(super::root().join("program/src/web/pages/base/texts.js")).unwrap();
     let table = text.split("export const GATES = {").nth(1).expect("the table");
     let mut rows: Vec<Vec<String>> = Vec::new();
     let mut inside = false;
@@ -55,7 +55,7 @@ fn every_condition_has_a_text_in_four_languages() {
     assert!(sources.len() > 35, "{sources:?}");
     let names: BTreeSet<String> = table.iter().map(|row| row[0].clone()).collect();
     let without: Vec<_> = sources.difference(&names).collect();
-    assert!(without.is_empty(), "src/web/pages/base/texts.js has no text for {without:?}");
+    assert!(without.is_empty(), "program/src/web/pages/base/texts.js has no text for {without:?}");
     let unused: Vec<_> = names.difference(&sources).collect();
     assert!(unused.is_empty(), "no condition is called {unused:?}");
     for row in table {

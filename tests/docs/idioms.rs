@@ -110,7 +110,7 @@ fn documents_use_no_banned_idiom() {
 #[test]
 fn messages_and_pages_use_no_banned_idiom() {
     let mut wrong = Vec::new();
-    for (name, text) in super::files(&["rs", "js"]).iter().filter(|(name, _)| name.starts_with("src/")) {
+    for (name, text) in super::files(&["rs", "js"]).iter().filter(|(name, _)| super::is_source(name)) {
         for (line, text) in quoted(text).iter().filter(|(_, text)| text.contains(' ')) {
             wrong.extend(found(text).iter().map(|hit| format!("{name}:{line}: {hit}: {text}")));
         }
@@ -123,7 +123,7 @@ fn messages_and_pages_use_no_banned_idiom() {
 fn the_messages_that_documents_explain_exist() {
     let source: Vec<String> = super::files(&["rs"])
         .iter()
-        .filter(|(name, _)| name.starts_with("src/"))
+        .filter(|(name, _)| super::is_source(name))
         .flat_map(|(_, text)| quoted(text))
         .map(|(_, text)| text)
         .collect();

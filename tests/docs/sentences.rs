@@ -7,7 +7,7 @@ const MOST: usize = 35;
 #[test]
 fn no_sentence_of_a_message_is_longer_than_35_words() {
     let mut long = Vec::new();
-    for (name, text) in super::files(&["rs", "js"]).iter().filter(|(name, _)| name.starts_with("src/")) {
+    for (name, text) in super::files(&["rs", "js"]).iter().filter(|(name, _)| super::is_source(name)) {
         for (line, text) in super::idioms::quoted(text) {
             for sentence in text.lines().flat_map(sentences).filter(|s| words(s) > MOST) {
                 long.push(format!("{name}:{line}: {} words: {sentence}", words(&sentence)));

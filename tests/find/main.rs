@@ -5,11 +5,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
-mod chain;
 mod coarse;
-mod dxf;
-mod insertion;
-mod maps;
 mod matching;
 mod pairs;
 mod photos;
@@ -17,4 +13,5 @@ mod plate;
 mod recipes;
 mod rim;
 mod scanned;
+mod shapes;
 mod sigma;

@@ -5,25 +5,12 @@
 #[path = "../common/mod.rs"]
 mod common;
 
-mod axis;
-mod bad_input;
 mod brackets;
 mod chain;
-mod clouds;
 mod cramer_rao;
 mod cut_stripes;
-mod engine;
 mod faint_stripes;
-mod golden;
-mod inputs;
-mod live;
 mod masks;
-mod print;
-mod profiles;
-mod readout;
-mod resume;
-mod round_parts;
 mod shift_scan;
 mod speckle_grain;
-mod steps;
 mod wide_stripes;

@@ -17,7 +17,10 @@ impl Case {
     }
 
     fn file(&self, name: &str) -> String {
-        let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/statements").join(self.name).join(name);
+        let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+            .join("tests/data/statements")
+            .join(self.name)
+            .join(name);
         path.to_str().unwrap().to_owned()
     }
 

@@ -2,33 +2,19 @@
 //! around them.
 //! Frame and unit: pixels; greys of 8 bits.
 
+use crate::shapes::{boxed, cover, disc};
 use rand::{Rng, SeedableRng};
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
 use sheetlight::find::{Kind, Layer, ModelOptions, Pose, Region, Scene, ShapeModel};
 
+pub use crate::shapes::part as bracket;
+
 pub const W: usize = 320;
 pub const H: usize = 256;
-const BLUR: f64 = 0.8;
-
-fn boxed(x: f64, y: f64, cx: f64, cy: f64, hw: f64, hh: f64) -> f64 {
-    let (dx, dy) = ((x - cx).abs() - hw, (y - cy).abs() - hh);
-    dx.max(0.0).hypot(dy.max(0.0)) + dx.max(dy).min(0.0)
-}
-
-fn disc(x: f64, y: f64, cx: f64, cy: f64, r: f64) -> f64 {
-    (x - cx).hypot(y - cy) - r
-}
 
 /// Signed distance to a part's material, negative inside; none is symmetric.
 pub type Part = fn(f64, f64) -> f64;
-
-/// A plate with a foot, two holes and a slot.
-pub fn bracket(x: f64, y: f64) -> f64 {
-    let plate = boxed(x, y, 0.0, 0.0, 34.0, 18.0).min(boxed(x, y, 26.0, 22.0, 8.0, 14.0));
-    let holes = disc(x, y, -20.0, 4.0, 6.0).min(disc(x, y, 2.0, -6.0, 4.0)).min(boxed(x, y, 18.0, 2.0, 9.0, 2.5));
-    plate.max(-holes)
-}
 
 /// A round cover: an ear, an off-centre bore, three screw holes.
 fn cover_plate(x: f64, y: f64) -> f64 {
@@ -47,11 +33,6 @@ fn comb(x: f64, y: f64) -> f64 {
 }
 
 pub const PARTS: [(&str, Part); 3] = [("bracket", bracket), ("cover", cover_plate), ("comb", comb)];
-
-/// Share of a blurred edge at a signed distance.
-fn cover(distance: f64) -> f64 {
-    1.0 / (1.0 + (1.702 * distance / BLUR).exp())
-}
 
 /// What lies on or under a part: distance in the picture, grey.
 #[derive(Clone, Copy)]

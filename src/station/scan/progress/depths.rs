@@ -170,7 +170,7 @@ mod tests {
         assert_eq!(said(&[at(151.0, &c, straight), at(189.0, &c, straight)]), None);
         assert_eq!(said(&[at(147.0, &c, straight)]), None, "within the margin");
         let mixed = said(&[at(160.0, &c, straight), at(212.0, &c, straight)]).unwrap();
-        assert!(mixed.starts_with("50 % of the points are extrapolated: they lie 212 to 212 mm"), "{mixed}");
+        assert!(mixed.starts_with("50 % of the points are extrapolated: they lie 212.0 to 212.0 mm"), "{mixed}");
         let turned = said(&[at(160.0, &c, [true, true])]).unwrap();
         assert!(turned.starts_with("100 %"), "{turned}");
         assert!(turned.contains("mirrored top to bottom or turned by 180 degrees, their points"), "{turned}");
