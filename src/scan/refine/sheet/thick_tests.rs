@@ -1,5 +1,5 @@
 //! In: simulated scans of printed surfaces, of a camera that goes on evenly or stands. Out: whether the sheet is found
-//! and its effect removed, and whether nothing moves where there is none.
+//! and its effect removed. Where the brightness is even, no point may move.
 //! Frame and unit: base frame, mm; rad.
 
 use super::*;

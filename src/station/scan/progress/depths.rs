@@ -9,10 +9,10 @@ use crate::rig::{Rig, Volume};
 use crate::scan::{Pictures, Profile};
 use crate::station::volume::calibrated;
 
-/// Every point of this number is examined: a share needs no more.
+/// One point in this many is examined. A share needs no more.
 const STEP: usize = 8;
-/// An extrapolation by this share of the calibrated depths is none worth a word: the boards' lit lines end there by
-/// chance.
+/// A point counts only if it lies beyond the calibrated depths by more than this share of their range. Where the boards
+/// stood nearest and farthest is chance.
 const MARGIN: f64 = 0.1;
 /// Least share of points beyond the depths that is remarked upon.
 const WORTH_A_WORD: f64 = 0.1;
@@ -107,8 +107,8 @@ impl Depths {
             String::new()
         } else {
             format!(
-                ". If no surface lies there, the pictures are not read out as at the calibration: {}, their points \
-                 would lie within",
+                ". If no surface lies there, the pictures may be mirrored or turned since the calibration: {}, their \
+                 points would lie within",
                 turned.join(" or ")
             )
         };
