@@ -130,8 +130,8 @@ impl Station {
     }
 
     fn __repr__(&self) -> String {
-        let of = |kinds: Vec<sheetlight::rig::Record<'_>>| {
-            kinds.iter().map(|r| r.kind.name()).collect::<Vec<_>>().join(", ")
+        let of = |kinds: Vec<&dyn sheetlight::rig::Record>| {
+            kinds.iter().map(|r| r.kind().name()).collect::<Vec<_>>().join(", ")
         };
         format!("Station({:?}, {})", self.folder.as_deref().unwrap_or(Path::new("")), of(self.rig.records()))
     }

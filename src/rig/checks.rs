@@ -13,9 +13,9 @@ use crate::geometry::{Axis, AxisKind, Camera, CountUnit, Frame, Plane, Ray, Rigi
 const UNIT: f64 = 1e-9;
 /// Limits of focal length over the picture's longer side: fields of view of 157 and of 0.3 degrees.
 const FOCAL: [f64; 2] = [0.1, 200.0];
-/// Largest distance of a sensor from its flange, and of a beam's foot point from its camera, mm.
+/// Largest distance of a sensor from its flange or the robot's base, and of a beam's foot point from its camera, mm.
 const FARTHEST: f64 = 5000.0;
-/// Distances from the flange's centre or the camera below this, mm, look like metres.
+/// Distances from flange, base or camera below this, mm, look like metres.
 const METRES: f64 = 2.0;
 
 /// Default advice, for values whose caller gives none.
@@ -128,13 +128,11 @@ impl<To: Frame, From: Frame> Measured for Rigid<To, From> {
     }
     fn doubt(&self) -> Option<String> {
         let t = self.translation.norm();
+        let lies = |digits: usize| format!("the {} lies {t:.digits$} mm from the origin of {}", From::NAME, To::NAME);
         // Exactly zero is a valid statement: the poses are the camera's own.
         (t > 0.0 && t < METRES)
-            .then(|| format!("the camera lies {t:.4} mm from the flange's centre, which looks like metres"))
-            .or_else(|| {
-                (t > FARTHEST)
-                    .then(|| format!("the camera lies {t:.0} mm from the flange, which looks like micrometres"))
-            })
+            .then(|| format!("{}, which looks like metres", lies(4)))
+            .or_else(|| (t > FARTHEST).then(|| format!("{}, which looks like micrometres", lies(0))))
     }
 }
 

@@ -3,55 +3,48 @@
 //! Frame and unit: as in the records.
 
 use super::calibration::FORMAT;
-use super::seal::{apart, sealed, shaped, unsealed};
-use super::{Calibration, HandEye, Joint, JointCovariance, Kind, Measured, Quality, Verdict};
+use super::seal::{apart, shaped, unsealed};
+use super::whole::of_every_part;
+use super::{Calibration, HandEye, Joint, Kind, Measured, Record, Rig};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::files::Together;
-use crate::geometry::{Axis, AxisKind, Base, Camera, Flange, Plane, Ray, Rigid, Sensor};
+use crate::geometry::{Axis, Base, Camera, Flange, Plane, Ray, Rigid, Sensor};
 use serde::{Serialize, de::DeserializeOwned};
 use std::path::{Path, PathBuf};
 
-/// The calibrations of a station; every part may be missing.
-#[derive(Clone, Debug, Default)]
-pub struct Rig {
-    /// Camera and lens.
-    pub camera: Option<Calibration<Intrinsics>>,
-    /// The sheet of light, camera frame.
-    pub laser_plane: Option<Calibration<Plane<Camera>>>,
-    /// The pointer's beam, camera frame.
-    pub pointer: Option<Calibration<Ray<Camera>>>,
-    /// Pose of the camera on the flange.
-    pub hand_eye: Option<Calibration<HandEye>>,
-    /// Pose of a fixed camera, before a robot that carries the part.
-    pub base_camera: Option<Calibration<Rigid<Base, Camera>>>,
-    /// Linear axis that moves the parts, or moves the camera along them.
-    pub linear_axis: Option<Calibration<Axis>>,
-    /// Turntable that turns the parts before the camera.
-    pub turntable: Option<Calibration<Axis>>,
-    /// Pose of a line-profile sensor on the flange.
-    pub profile_hand_eye: Option<Calibration<Rigid<Flange, Sensor>>>,
-    /// Joint covariance of the records, if they were calibrated together.
-    pub joint: Joint,
-}
+macro_rules! read_by_kind {
+    ($($(#[$doc:meta])* $field:ident: $kind:ident($value:ty),)*) => {
+        impl Rig {
+            /// The records in a folder.
+            fn read(folder: &Path) -> Result<Rig> {
+                Ok(Rig { $($field: read(folder, Kind::$kind)?,)* joint: Joint::default() })
+            }
 
-/// Metadata of a record, independent of its value.
-#[derive(Clone, Copy, Debug)]
-pub struct Record<'a> {
-    /// Kind of the record.
-    pub kind: Kind,
-    /// Time of the measurement, RFC 3339.
-    pub created: &'a str,
-    /// Quality of the result.
-    pub quality: &'a Quality,
-    /// What users have vouched for.
-    pub remarks: &'a [String],
-}
+            /// Seals a file again that has no seal, was edited, or depends on another camera; the user states the
+            /// reason. The remark stays in the file. A file that is no calibration at all is still refused.
+            pub fn vouch(station: &Path, kind: Kind, why: &str, as_stated: bool) -> Result<PathBuf> {
+                let vouch = match kind {
+                    $(Kind::$kind => vouch::<$value>,)*
+                };
+                vouch(station, kind, why, as_stated)
+            }
 
-impl<'a> Record<'a> {
-    fn of<T>(c: &'a Calibration<T>) -> Record<'a> {
-        Record { kind: c.kind, created: &c.created, quality: &c.quality, remarks: &c.remarks }
-    }
+            /// The record that a text of JSON holds, such as a result that waits to be stored. It is not checked.
+            pub fn record(text: &str) -> serde_json::Result<Box<dyn Record>> {
+                Ok(match serde_json::from_str::<Of>(text)?.kind {
+                    $(Kind::$kind => Box::new(serde_json::from_str::<Calibration<$value>>(text)?),)*
+                })
+            }
+        }
+    };
+}
+of_every_part!(read_by_kind);
+
+/// What tells the value of a record.
+#[derive(serde::Deserialize)]
+struct Of {
+    kind: Kind,
 }
 
 impl Rig {
@@ -60,21 +53,6 @@ impl Rig {
         let folder = station.join("calibration");
         together(&folder).settle()?;
         Ok(Rig { joint: Joint::load(station), ..Rig::read(&folder)? })
-    }
-
-    /// The records in a folder.
-    fn read(folder: &Path) -> Result<Rig> {
-        Ok(Rig {
-            camera: read(folder, Kind::Camera)?,
-            laser_plane: read(folder, Kind::LaserPlane)?,
-            pointer: read(folder, Kind::Pointer)?,
-            hand_eye: read(folder, Kind::HandEye)?,
-            base_camera: read(folder, Kind::BaseCamera)?,
-            linear_axis: read(folder, Kind::LinearAxis)?,
-            turntable: read(folder, Kind::Turntable)?,
-            profile_hand_eye: read(folder, Kind::ProfileHandEye)?,
-            joint: Joint::default(),
-        })
     }
 
     /// Loads the rig for a calibration that uses the camera. A spoilt earlier result, of this or of another kind,
@@ -91,23 +69,19 @@ impl Rig {
     /// Stores one calibration under `station/calibration/<kind>.json`, and its `page`, if given, beside it as
     /// `<kind>.html`. The previous calibration is kept as `<kind>.previous.json`. Either the new file is complete or
     /// the old one is untouched.
-    pub fn store<T: Serialize + Measured>(
-        station: &Path,
-        calibration: &Calibration<T>,
-        page: Option<&str>,
-    ) -> Result<PathBuf> {
-        calibration.check(calibration.kind)?;
+    pub fn store(station: &Path, record: &dyn Record, page: Option<&str>) -> Result<PathBuf> {
+        let text = record.text()?;
         let folder = station.join("calibration");
         crate::files::make_folder(&folder)?;
         let _lock = crate::files::Lock::wait(&folder, "import")?;
         together(&folder).settle_locked()?;
-        let path = file(station, calibration.kind);
+        let path = file(station, record.kind());
         if let Some(former) = crate::files::read_text_if_there(&path)? {
             crate::files::write(&path.with_extension("previous.json"), former.as_bytes())?;
         }
         let html = path.with_extension("html");
         let beside: Vec<(&Path, &[u8])> = page.iter().map(|p| (html.as_path(), p.as_bytes())).collect();
-        crate::files::write_beside((&path, sealed(calibration).as_bytes()), &beside)?;
+        crate::files::write_beside((&path, text.as_bytes()), &beside)?;
         Ok(path)
     }
 
@@ -124,15 +98,8 @@ impl Rig {
         station: &Path,
         others: impl FnOnce(&Rig) -> Vec<(&'static str, String)>,
     ) -> Result<Vec<Kind>> {
-        let mut texts = Vec::new();
-        add(&mut texts, &self.camera)?;
-        add(&mut texts, &self.laser_plane)?;
-        add(&mut texts, &self.pointer)?;
-        add(&mut texts, &self.hand_eye)?;
-        add(&mut texts, &self.base_camera)?;
-        add(&mut texts, &self.linear_axis)?;
-        add(&mut texts, &self.turntable)?;
-        add(&mut texts, &self.profile_hand_eye)?;
+        let texts =
+            self.records().into_iter().map(|part| Ok((part.kind(), part.text()?))).collect::<Result<Vec<_>>>()?;
         let folder = station.join("calibration");
         crate::files::make_folder(&folder)?;
         let set = together(&folder);
@@ -152,276 +119,39 @@ impl Rig {
         Ok(texts.into_iter().map(|(kind, _)| kind).collect())
     }
 
-    /// Seals a file again that has no seal, was edited, or depends on another camera; the user states the reason.
-    /// The remark stays in the file. A file that is no calibration at all is still refused.
-    pub fn vouch<T: Serialize + DeserializeOwned + Measured>(
-        station: &Path,
-        kind: Kind,
-        why: &str,
-        as_stated: bool,
-    ) -> Result<PathBuf> {
-        let path = file(station, kind);
-        let text = crate::files::read_text(&path)?;
-        let what = path.display().to_string();
-        let redo = |e: Fault| e.next(again(kind));
-        let (mut value, _) = apart(&text, &what).map_err(redo)?;
-        let today = jiff::Timestamp::now().strftime("%Y-%m-%d");
-        let object = value.as_object_mut().expect("apart refuses all else");
-        // In format 1 every writer chose its own names of frames, and the two lists were missing.
-        object.insert("format".into(), FORMAT.into());
-        object.insert("frame".into(), serde_json::to_value(kind.place()).expect("a name"));
-        object.entry("rests_on").or_insert_with(|| serde_json::json!({}));
-        object.entry("remarks").or_insert_with(|| serde_json::json!([]));
-        let mut c: Calibration<T> = shaped(value, &what).map_err(redo)?;
-        let camera = if kind.rests_on_camera() { Rig::load_camera(station)?.camera } else { None };
-        c.rests_on = camera.map(|c| (Kind::Camera, c.content())).into_iter().collect();
-        c.remarks.push(format!("vouched for on {today}: {why}"));
-        c.check(kind).map_err(|e| redo(e.at(&what)))?;
-        if !as_stated {
-            asked(&c.value).map_err(|e| e.at(&what))?;
-        }
-        Rig::store(station, &c, None)
-    }
-
-    /// The camera; if it is missing, an error that says what to do.
-    pub fn need_camera(&self) -> Result<&Calibration<Intrinsics>> {
-        self.camera.as_ref().ok_or_else(|| missing(Kind::Camera))
-    }
-    /// The sensor's hot pixels as the calibrations know them: the laser plane's, whose pictures are dark, else the
-    /// camera's. In room light a fixed camera may take a speck of the background for a hot pixel.
-    pub fn hot_pixels(&self) -> &[[u32; 2]] {
-        let of = [self.laser_plane.as_ref().map(|c| &c.hot_pixels), self.camera.as_ref().map(|c| &c.hot_pixels)];
-        of.into_iter().flatten().find(|hot| !hot.is_empty()).map_or(&[], |hot| hot)
-    }
-
-    /// The sheet of light; an error if it is missing or was measured with another camera.
-    pub fn need_laser_plane(&self) -> Result<&Calibration<Plane<Camera>>> {
-        self.belonging(&self.laser_plane)?.ok_or_else(|| missing(Kind::LaserPlane))
-    }
-    /// The pointer's beam; an error if it is missing or was measured with another camera.
-    pub fn need_pointer(&self) -> Result<&Calibration<Ray<Camera>>> {
-        self.belonging(&self.pointer)?.ok_or_else(|| missing(Kind::Pointer))
-    }
-    /// Pose of the camera on the flange; an error if it is missing or was measured with another camera.
-    pub fn need_hand_eye(&self) -> Result<&Calibration<HandEye>> {
-        self.belonging(&self.hand_eye)?.ok_or_else(|| missing(Kind::HandEye))
-    }
-    /// Pose of the fixed camera; an error if it is missing or was measured with another camera.
-    pub fn need_base_camera(&self) -> Result<&Calibration<Rigid<Base, Camera>>> {
-        self.belonging(&self.base_camera)?.ok_or_else(|| missing(Kind::BaseCamera))
-    }
-    /// The axis of this kind; an error if it is missing or was measured with another camera.
-    pub fn need_axis(&self, kind: AxisKind) -> Result<&Calibration<Axis>> {
-        let (axis, kind) = match kind {
-            AxisKind::Linear => (&self.linear_axis, Kind::LinearAxis),
-            AxisKind::Turntable => (&self.turntable, Kind::Turntable),
-        };
-        self.belonging(axis)?.ok_or_else(|| missing(kind))
-    }
-    /// Pose of a line-profile sensor on the flange; an error if it is missing.
-    pub fn need_profile_hand_eye(&self) -> Result<&Calibration<Rigid<Flange, Sensor>>> {
-        self.profile_hand_eye.as_ref().ok_or_else(|| missing(Kind::ProfileHandEye))
-    }
-    /// The rig's axis, if it has one.
-    ///
-    /// # Errors
-    /// A rig with both a linear axis and a turntable. The motion of a recording states which of them moved:
-    /// [`crate::scan::parts_for`].
-    pub fn axis(&self) -> Result<Option<&Calibration<Axis>>> {
-        match (&self.linear_axis, &self.turntable) {
-            (Some(_), Some(_)) => {
-                Err(Fault::refused("the rig has a linear axis and a turntable, one of them is needed")
-                    .cause("it is unknown which of the two moved the part")
-                    .next("take the parts of the rig that the recording's motion rests on"))
-            }
-            (linear, turntable) => Ok(linear.as_ref().or(turntable.as_ref())),
-        }
-    }
-
-    /// Metadata of every existing record.
-    pub fn records(&self) -> Vec<Record<'_>> {
-        [
-            self.camera.as_ref().map(Record::of),
-            self.laser_plane.as_ref().map(Record::of),
-            self.hand_eye.as_ref().map(Record::of),
-            self.pointer.as_ref().map(Record::of),
-            self.base_camera.as_ref().map(Record::of),
-            self.linear_axis.as_ref().map(Record::of),
-            self.turntable.as_ref().map(Record::of),
-            self.profile_hand_eye.as_ref().map(Record::of),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
-    }
-
     /// Whether a station has such a record, readable or not.
     pub fn stored(station: &Path, kind: Kind) -> bool {
         file(station, kind).is_file()
     }
-
-    /// Refuses a rig that lacks two or more of these kinds, and names all of them. One that lacks a single kind is left
-    /// to that kind's own `need_`.
-    pub fn need_all(&self, kinds: &[Kind]) -> Result<()> {
-        let there: Vec<Kind> = self.records().iter().map(|r| r.kind).collect();
-        let absent: Vec<&Kind> = kinds.iter().filter(|k| !there.contains(k)).collect();
-        if absent.len() < 2 {
-            return Ok(());
-        }
-        let listed = |word: fn(&Kind) -> String| absent.iter().map(|k| word(k)).collect::<Vec<_>>().join(", ");
-        Err(Fault::input(format!("the station has no calibration of these kinds: {}", listed(|kind| kind.words())))
-            .cause(NEVER_CALIBRATED)
-            .next(format!(
-                "run sheetlight calibrate for each in this order: {}; or import known values with sheetlight station \
-                 import",
-                listed(|kind| kind.command())
-            )))
-    }
-
-    /// What the station lacks to scan, as a remark; `None` if it has a camera, a laser plane, and the camera's pose or
-    /// an axis, or only a line-profile sensor.
-    pub fn unfinished(&self) -> Option<String> {
-        let there: Vec<Kind> = self.records().iter().map(|r| r.kind).collect();
-        let posed = [Kind::HandEye, Kind::BaseCamera, Kind::LinearAxis, Kind::Turntable];
-        let lacks = |kinds: &[Kind]| !kinds.iter().any(|k| there.contains(k));
-        if !lacks(&[Kind::ProfileHandEye]) && lacks(&[Kind::Camera, Kind::LaserPlane]) {
-            return None;
-        }
-        let absent: Vec<&str> = [
-            (lacks(&[Kind::Camera]), "camera"),
-            (lacks(&[Kind::LaserPlane]), "laser plane"),
-            (lacks(&posed), "hand-eye (or base camera, linear axis or turntable)"),
-        ]
-        .into_iter()
-        .filter_map(|(absent, name)| absent.then_some(name))
-        .collect();
-        (!absent.is_empty())
-            .then(|| format!("the station cannot scan yet, it has no calibration of: {}", absent.join(", ")))
-    }
-
-    /// The parts that were measured with another camera than the station's, and what is wrong with each.
-    pub fn stale(&self) -> Vec<(Kind, String)> {
-        let parts = [
-            self.other_camera(&self.laser_plane),
-            self.other_camera(&self.pointer),
-            self.other_camera(&self.hand_eye),
-            self.other_camera(&self.base_camera),
-            self.other_camera(&self.linear_axis),
-            self.other_camera(&self.turntable),
-        ];
-        parts.into_iter().flatten().collect()
-    }
-
-    /// Refuses a rig if one of its parts was measured with another camera than the station's; all of them are named.
-    pub fn belong_together(&self) -> Result<()> {
-        let stale = self.stale();
-        let listed = |word: fn(&Kind) -> String| stale.iter().map(|(k, _)| word(k)).collect::<Vec<_>>().join(", ");
-        match &stale[..] {
-            [] => Ok(()),
-            [(kind, what)] => Err(made_with_another(*kind, what.clone())),
-            _ => {
-                let now = self.camera.as_ref().map(Calibration::content).unwrap_or_default();
-                let names = listed(|kind| kind.words());
-                let what = format!("{} calibrations were measured with another camera than {now:.12}", stale.len());
-                Err(Fault::refused(format!("{what}: {names}"))
-                    .cause(OTHER_CAMERA)
-                    .next(format!("run sheetlight calibrate again for each: {}", listed(|kind| kind.command()))))
-            }
-        }
-    }
-
-    fn belonging<'a, T>(&self, part: &'a Option<Calibration<T>>) -> Result<Option<&'a Calibration<T>>> {
-        self.other_camera(part).map_or(Ok(part.as_ref()), |(kind, what)| Err(made_with_another(kind, what)))
-    }
-
-    /// Which part it is, and what is wrong, if it was measured with another camera than the station's.
-    fn other_camera<T>(&self, part: &Option<Calibration<T>>) -> Option<(Kind, String)> {
-        let (c, camera) = (part.as_ref()?, self.camera.as_ref()?);
-        let (now, then) = (camera.content(), c.rests_on.get(&Kind::Camera));
-        if !c.kind.rests_on_camera() || then == Some(&now) {
-            return None;
-        }
-        let what = c.kind.words();
-        let why = match then {
-            Some(then) => format!("the {what} was measured with camera {then:.12}, the station now has {now:.12}"),
-            None => format!("the {what} names no camera, the station has camera {now:.12}"),
-        };
-        Some((c.kind, why))
-    }
-
-    /// The joint covariance of camera, laser plane and the camera's pose. `None` if none was ever stated.
-    ///
-    /// # Errors
-    /// The reason, in words, why the stated covariance does not apply to these records: a record was replaced since,
-    /// or the file is spoilt.
-    pub fn joint(&self) -> Option<std::result::Result<&JointCovariance, String>> {
-        let stated = match &self.joint {
-            Joint::Absent => return None,
-            Joint::Spoilt(why) => return Some(Err(why.clone())),
-            Joint::Stated(c) => c,
-        };
-        let now = [
-            (Kind::Camera, self.camera.as_ref().map(|c| c.content())),
-            (Kind::LaserPlane, self.laser_plane.as_ref().map(|c| c.content())),
-            match (&self.hand_eye, &self.base_camera) {
-                (None, Some(c)) => (Kind::BaseCamera, Some(c.content())),
-                (c, _) => (Kind::HandEye, c.as_ref().map(|c| c.content())),
-            },
-        ];
-        let other = |kind: Kind| format!("joint.json is of another {} than the station's", kind.words());
-        Some(stated.other(&now).map_or(Ok(stated), |kind| Err(other(kind))))
-    }
-
-    /// Remarks for reports that depend on these calibrations: what users have vouched for, and which records are
-    /// badly determined.
-    pub fn remarks(&self) -> Vec<String> {
-        let of = |r: Record| {
-            let mut said: Vec<String> = r.remarks.iter().map(|said| format!("{}: {said}", r.kind.words())).collect();
-            if r.quality.verdict > Verdict::Usable {
-                said.push(format!("{}: {}", r.kind.words(), r.quality.verdict.words()));
-            }
-            said
-        };
-        self.records().into_iter().flat_map(of).collect()
-    }
-
-    /// One hash over the values that turn pixels into points. A scan stores it, so that a later step can check
-    /// whether the scan was taken with the station's present calibration.
-    pub fn fingerprint(&self) -> String {
-        let mut values = serde_json::json!({
-            "camera": self.camera.as_ref().map(|c| c.value),
-            "laser_plane": self.laser_plane.as_ref().map(|c| c.value),
-            "hand_eye": self.hand_eye.as_ref().map(|c| c.value),
-        });
-        // Included only if present, so that scans of older versions keep their fingerprint.
-        let others = [
-            ("base_camera", self.base_camera.as_ref().map(|c| serde_json::json!(c.value))),
-            ("linear_axis", self.linear_axis.as_ref().map(|c| serde_json::json!(c.value))),
-            ("turntable", self.turntable.as_ref().map(|c| serde_json::json!(c.value))),
-            ("profile_hand_eye", self.profile_hand_eye.as_ref().map(|c| serde_json::json!(c.value))),
-        ];
-        for (name, value) in others.into_iter().filter_map(|(n, v)| Some((n, v?))) {
-            values[name] = value;
-        }
-        super::hash_text(values.to_string().as_bytes())
-    }
 }
 
-/// Refuses values that look like another unit; for values that a user enters.
-pub fn asked(value: &impl Measured) -> Result<()> {
-    value.doubt().map_or(Ok(()), |doubt| {
-        Err(Fault::refused(doubt)
-            .cause("metres, or another unit than millimetres")
-            .next("convert it to mm, or confirm it with --as-stated"))
-    })
-}
-
-fn add<T: Serialize + Measured>(texts: &mut Vec<(Kind, String)>, part: &Option<Calibration<T>>) -> Result<()> {
-    if let Some(c) = part {
-        c.check(c.kind).map_err(|e| e.at(c.kind.words()))?;
-        texts.push((c.kind, sealed(c)));
+fn vouch<T: Serialize + DeserializeOwned + Measured>(
+    station: &Path,
+    kind: Kind,
+    why: &str,
+    as_stated: bool,
+) -> Result<PathBuf> {
+    let path = file(station, kind);
+    let text = crate::files::read_text(&path)?;
+    let what = path.display().to_string();
+    let redo = |e: Fault| e.next(again(kind));
+    let (mut value, _) = apart(&text, &what).map_err(redo)?;
+    let today = jiff::Timestamp::now().strftime("%Y-%m-%d");
+    let object = value.as_object_mut().expect("apart refuses all else");
+    // In format 1 every writer chose its own names of frames, and the two lists were missing.
+    object.insert("format".into(), FORMAT.into());
+    object.insert("frame".into(), serde_json::to_value(kind.place()).expect("a name"));
+    object.entry("rests_on").or_insert_with(|| serde_json::json!({}));
+    object.entry("remarks").or_insert_with(|| serde_json::json!([]));
+    let mut c: Calibration<T> = shaped(value, &what).map_err(redo)?;
+    let camera = if kind.rests_on_camera() { Rig::load_camera(station)?.camera } else { None };
+    c.rests_on = camera.map(|c| (Kind::Camera, c.content())).into_iter().collect();
+    c.remarks.push(format!("vouched for on {today}: {why}"));
+    c.check(kind).map_err(|e| redo(e.at(&what)))?;
+    if !as_stated {
+        c.likely().map_err(|e| e.at(&what))?;
     }
-    Ok(())
+    Rig::store(station, &c, None)
 }
 
 /// Stores calibrations together; the records that they replace are kept, the replaced pages are not.
@@ -440,15 +170,6 @@ fn together(folder: &Path) -> Together<'_> {
     Together::new(folder, "import", keep_former)
 }
 
-fn made_with_another(kind: Kind, what: String) -> Fault {
-    let next = format!("run sheetlight calibrate {} again", kind.command());
-    Fault::refused(what)
-        .cause(OTHER_CAMERA)
-        .next(format!("{next}; put camera.previous.json back only if the camera's new calibration was a mistake"))
-}
-
-const OTHER_CAMERA: &str = "the camera was calibrated or imported again, or files of two stations were mixed";
-
 fn again(kind: Kind) -> String {
     format!(
         "run sheetlight calibrate {} again; if you know that its values are right, sheetlight station seal --kind {} \
@@ -456,16 +177,6 @@ fn again(kind: Kind) -> String {
         kind.command(),
         kind.name().replace('_', "-")
     )
-}
-
-const NEVER_CALIBRATED: &str = "it was never calibrated, or another folder was given as --station";
-
-fn missing(kind: Kind) -> Fault {
-    // A profile sensor's pose is not among the values that are imported.
-    let or = if kind == Kind::ProfileHandEye { "" } else { ", or import known values with sheetlight station import" };
-    Fault::input(format!("the station has no {} calibration", kind.words()))
-        .cause(NEVER_CALIBRATED)
-        .next(format!("run sheetlight calibrate {}{or}", kind.command()))
 }
 
 fn file(station: &Path, kind: Kind) -> PathBuf {
@@ -492,9 +203,9 @@ fn read<T: DeserializeOwned + Measured>(folder: &Path, kind: Kind) -> Result<Opt
 
 #[cfg(test)]
 mod tests {
-    use super::super::Covariance;
+    use super::super::{Covariance, Quality, Verdict};
     use super::*;
-    use crate::geometry::Vec3;
+    use crate::geometry::{AxisKind, Vec3};
 
     fn quality() -> Quality {
         let (reasons, advice) = (vec![], vec![]);
@@ -539,6 +250,20 @@ mod tests {
     }
 
     #[test]
+    fn a_record_is_of_the_kind_that_its_text_names() {
+        let dir = tempfile::tempdir().unwrap();
+        let camera = camera(611.6);
+        let text = serde_json::to_string(&plane(70.0, &camera)).unwrap();
+        let record = Rig::record(&text).unwrap();
+        assert_eq!((record.kind(), record.camera()), (Kind::LaserPlane, Some(&*camera.content())));
+        Rig::store(dir.path(), &camera, None).unwrap();
+        Rig::store(dir.path(), record.as_ref(), None).unwrap();
+        assert_eq!(Rig::load(dir.path()).unwrap().need_laser_plane().unwrap().value.offset, 70.0);
+        assert!(Rig::record(&text.replace("laser_plane", "turntable")).is_err());
+        assert!(Rig::record("{}").is_err());
+    }
+
+    #[test]
     fn a_plane_is_used_with_its_own_camera_only() {
         let dir = tempfile::tempdir().unwrap();
         let (old, new) = (camera(611.6), camera(611.7));
@@ -555,7 +280,7 @@ mod tests {
         let all = Rig { pointer: Some(pointer), ..rig };
         let said = all.belong_together().unwrap_err();
         assert!(said.what.ends_with("laser plane, pointer") && said.next.ends_with("laser-plane, pointer"), "{said}");
-        Rig::vouch::<Plane<Camera>>(dir.path(), Kind::LaserPlane, "only the focus was touched", false).unwrap();
+        Rig::vouch(dir.path(), Kind::LaserPlane, "only the focus was touched", false).unwrap();
         let rig = Rig::load(dir.path()).unwrap();
         rig.need_laser_plane().unwrap();
         assert!(rig.remarks()[0].contains("only the focus was touched"), "{:?}", rig.remarks());

@@ -3,7 +3,6 @@
 //! Frame and unit: `A_T_b` maps coordinates in frame b to frame A; the unit is part of a parameter's name.
 
 use crate::camera::{ALWAYS_NAMED, NAMES, PARAMETERS};
-use std::collections::BTreeMap;
 
 /// What a calibration describes.
 #[derive(
@@ -72,18 +71,6 @@ const TURNTABLE: [&str; 7] = ["dx", "dy", "dz", "pitch_rad", "px_mm", "py_mm", "
 const POSE: [&str; 6] = ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"];
 
 impl Kind {
-    /// The kinds that a station's scans and ranges use.
-    pub const OF_A_RIG: [Kind; 8] = [
-        Kind::Camera,
-        Kind::LaserPlane,
-        Kind::Pointer,
-        Kind::HandEye,
-        Kind::BaseCamera,
-        Kind::LinearAxis,
-        Kind::Turntable,
-        Kind::ProfileHandEye,
-    ];
-
     /// Name in files and in file names.
     pub fn name(self) -> &'static str {
         self.into()
@@ -133,9 +120,8 @@ impl std::str::FromStr for Kind {
     /// Accepts the name in files or that of the command: `laser_plane`, `laser-plane`.
     fn from_str(s: &str) -> Result<Kind, String> {
         let name = s.replace('-', "_");
-        let known = BTreeMap::from(Kind::OF_A_RIG.map(|k| (k.name(), k)));
-        known.get(name.as_str()).copied().ok_or_else(|| {
-            let names = Kind::OF_A_RIG.map(|k| k.name().replace('_', "-"));
+        Kind::OF_A_RIG.iter().find(|k| k.name() == name).copied().ok_or_else(|| {
+            let names: Vec<String> = Kind::OF_A_RIG.iter().map(|k| k.name().replace('_', "-")).collect();
             format!("unknown calibration '{s}': {}", names.join(", "))
         })
     }

@@ -15,13 +15,13 @@ mod pictures;
 mod plan;
 mod seal;
 mod volume;
+mod whole;
 
 pub use calibration::{
     AXIS_SIGMA_DEG, AXIS_SIGMA_MM, Calibration, HandEye, Quality, ROBOT_SIGMA_DEG, ROBOT_SIGMA_MM, Verdict, axis_sigma,
     hash_file,
 };
 pub use covariance::Covariance;
-pub use folder::{Record, Rig, asked};
 pub use hash::hash_text;
 pub use joint::{Joint, JointCovariance};
 pub use kind::{Kind, Place, Units};
@@ -30,3 +30,4 @@ pub(crate) use once::parse as json_once;
 pub use plan::{RigForecast, RigPlan};
 pub use seal::{sealed, unsealed};
 pub use volume::Volume;
+pub use whole::{Record, Rig};

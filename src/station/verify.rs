@@ -9,7 +9,7 @@ use crate::find::look::looks::{Disagreement, Look, agree};
 use crate::find::look::register::{Registered, register};
 use crate::find::measure::points::Ordered;
 use crate::geometry::Vec3;
-use crate::rig::{Calibration, Rig};
+use crate::rig::{Quality, Record, Rig};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -68,12 +68,12 @@ pub struct VerifyReport {
 /// Verdict of a calibration that was measured with another camera than the station's.
 const OTHER_CAMERA: &str = "of another camera";
 
-fn check<T>(c: &Calibration<T>) -> CalibrationCheck {
+fn check(quality: &Quality) -> CalibrationCheck {
     let pick = |f: &dyn Fn(&str) -> bool| -> BTreeMap<String, f64> {
-        c.quality.figures.iter().filter(|(k, _)| f(k)).map(|(k, v)| (k.clone(), *v)).collect()
+        quality.figures.iter().filter(|(k, _)| f(k)).map(|(k, v)| (k.clone(), *v)).collect()
     };
     CalibrationCheck {
-        verdict: c.quality.verdict.words().into(),
+        verdict: quality.verdict.words().into(),
         fit: pick(&|k| k.starts_with("rms_")),
         verification: pick(&|k| k.starts_with("holdout") || k.starts_with("expected_error")),
     }
@@ -81,21 +81,13 @@ fn check<T>(c: &Calibration<T>) -> CalibrationCheck {
 
 /// Checks a station with data that its calibrations did not use.
 pub fn verify(rig: &Rig, run: &VerifyRun) -> Result<VerifyReport> {
-    let mut calibrations = BTreeMap::new();
     let stale = rig.stale();
-    let mut add = |name: &str, c: Option<CalibrationCheck>| {
-        let other = stale.iter().any(|(kind, _)| kind.words() == name);
-        let judged = c.map(|c| if other { CalibrationCheck { verdict: OTHER_CAMERA.into(), ..c } } else { c });
-        judged.map(|c| calibrations.insert(name.to_owned(), c))
+    let checked = |part: &dyn Record| {
+        let other = stale.iter().any(|(kind, _)| *kind == part.kind());
+        let judged = check(part.quality());
+        (part.kind().words(), if other { CalibrationCheck { verdict: OTHER_CAMERA.into(), ..judged } } else { judged })
     };
-    add("camera", rig.camera.as_ref().map(check));
-    add("laser plane", rig.laser_plane.as_ref().map(check));
-    add("pointer", rig.pointer.as_ref().map(check));
-    add("hand-eye", rig.hand_eye.as_ref().map(check));
-    add("base camera", rig.base_camera.as_ref().map(check));
-    add("linear axis", rig.linear_axis.as_ref().map(check));
-    add("turntable", rig.turntable.as_ref().map(check));
-    add("profile hand-eye", rig.profile_hand_eye.as_ref().map(check));
+    let calibrations: BTreeMap<String, CalibrationCheck> = rig.records().into_iter().map(checked).collect();
     if calibrations.is_empty() {
         return Err(Fault::input("the station has no calibration")
             .cause("another folder was given as --station")

@@ -218,6 +218,17 @@ fn an_import_is_all_or_nothing() {
     assert!(said.contains("measured with another camera") && said.contains("laser-plane, hand-eye"), "{said}");
     run(&import(VALUES, &[]));
     run(&b.scan("recording", "out", &[]));
+    // A camera that stands still is asked about its unit as one on the flange is, and is shown.
+    let standing = |mm: [f64; 3]| {
+        let rows = json!([1, 0, 0, mm[0], 0, -1, 0, mm[1], 0, 0, -1, mm[2], 0, 0, 0, 1]);
+        json!({"base_T_camera": rows}).to_string()
+    };
+    let said = refused(&import(&standing([0.4, 0.1, 0.9]), &[]));
+    assert!(said.contains("the camera lies 0.9899 mm from the origin of base, which looks like metres"), "{said}");
+    run(&import(&standing([400.0, 100.0, 900.0]), &[]));
+    let shown = run(&["station".into(), "show".into(), "--station".into(), b.text("station")]);
+    assert!(shown.contains("base camera  400.0000 100.0000 900.0000 mm"), "{shown}");
+    std::fs::remove_file(b.at("station/calibration/base_camera.json")).unwrap();
     // Metres that are meant.
     let near = VALUES.replace("\"offset_mm\": 72", "\"offset_mm\": 1.5");
     assert!(refused(&import(&near, &[])).contains("--as-stated"));

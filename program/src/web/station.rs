@@ -6,7 +6,7 @@ use super::message::{CalibrationAge, CalibrationState, FrameInfo, Problem, Stati
 use super::work::Place;
 use jiff::{Timestamp, Unit};
 use serde_json::Value;
-use sheetlight::rig::{Kind, Quality, Record, Rig, Verdict};
+use sheetlight::rig::{Kind, Record, Rig, Verdict};
 use sheetlight::robot::Convention;
 use sheetlight::station::Settings;
 use std::collections::BTreeMap;
@@ -22,21 +22,21 @@ fn days_since(created: &str) -> f64 {
     since.and_then(|s| s.total(Unit::Hour).ok()).map_or(f64::NAN, |hours| (hours / 24.0).max(0.0))
 }
 
-fn state(record: &Record) -> CalibrationState {
-    let q: &Quality = record.quality;
+fn state(record: &dyn Record) -> CalibrationState {
+    let q = record.quality();
     CalibrationState {
-        kind: record.kind.name().into(),
-        words: record.kind.words(),
+        kind: record.kind().name().into(),
+        words: record.kind().words(),
         verdict: q.verdict.words().into(),
-        created: record.created.to_owned(),
-        days: days_since(record.created),
+        created: record.created().to_owned(),
+        days: days_since(record.created()),
         expected_mm: EXPECTED.iter().find_map(|k| q.figures.get(*k).copied()),
     }
 }
 
 /// All existing calibrations.
 pub fn calibrations(rig: &Rig) -> Vec<CalibrationState> {
-    rig.records().iter().map(state).collect()
+    rig.records().into_iter().map(state).collect()
 }
 
 /// The bar's summary of the calibrations; `None` without a camera, a laser plane and the calibration of the motion
@@ -46,7 +46,7 @@ pub fn age(rig: &Rig) -> Option<CalibrationAge> {
     let carried =
         rig.hand_eye.is_some() || rig.base_camera.is_some() || rig.linear_axis.is_some() || rig.turntable.is_some();
     rig.camera.as_ref().zip(rig.laser_plane.as_ref()).filter(|_| carried)?;
-    let verdicts = rig.records().into_iter().map(|r| (r.quality.verdict, r.kind.words()));
+    let verdicts = rig.records().into_iter().map(|r| (r.quality().verdict, r.kind().words()));
     let joint = rig.joint().and_then(std::result::Result::err).map(|_| (Verdict::Usable, JOINT.to_owned()));
     let (verdict, worst) = verdicts.chain(joint).reduce(|a, b| if b.0 > a.0 { b } else { a })?;
     let all = calibrations(rig);

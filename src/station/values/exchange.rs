@@ -7,7 +7,7 @@ use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Axis, AxisKind, Base, Camera, ORTHONORMAL_WARN, Plane, Ray, Rigid, Vec3};
 use crate::rig::{
-    Calibration, Covariance, HandEye, Kind, Quality, ROBOT_SIGMA_DEG, ROBOT_SIGMA_MM, Rig, Verdict, asked, json_once,
+    Calibration, Covariance, HandEye, Kind, Quality, ROBOT_SIGMA_DEG, ROBOT_SIGMA_MM, Record, Rig, Verdict, json_once,
 };
 use serde_json::Value;
 use std::path::Path;
@@ -160,14 +160,14 @@ impl Values {
         let (laser_plane, pointer, hand_eye) = (plane.transpose()?, pointer.transpose()?, hand_eye.transpose()?);
         if !as_stated {
             self.intrinsics.as_ref().map_or(Ok(()), of_its_pictures).map_err(|e| e.at(source.display()))?;
-            laser_plane.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
-            pointer.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
-            hand_eye.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
         }
-        let stored =
-            Rig { camera, laser_plane, pointer, hand_eye, base_camera, linear_axis, turntable, ..Rig::default() }
-                .store_all(station)
-                .map_err(|e| e.at(source.display()).next("correct the file; nothing was imported of it"))?;
+        let rig = Rig { camera, laser_plane, pointer, hand_eye, base_camera, linear_axis, turntable, ..Rig::default() };
+        if !as_stated {
+            rig.records().into_iter().try_for_each(Record::likely)?;
+        }
+        let stored = rig
+            .store_all(station)
+            .map_err(|e| e.at(source.display()).next("correct the file; nothing was imported of it"))?;
         if stored.is_empty() {
             return Err(Fault::input(format!("{}: contains no values of a rig", source.display()))
                 .cause("another kind of JSON file")

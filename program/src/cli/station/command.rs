@@ -7,10 +7,10 @@ use crate::cli::terminal::console::Console;
 use crate::cli::terminal::outputs;
 use crate::cli::terminal::outputs::Inputs;
 use sheetlight::calibrate::hand_eye::options::Mount;
-use sheetlight::camera::{Intrinsics, LENS, NAMES};
+use sheetlight::camera::{LENS, NAMES};
 use sheetlight::fault::{Fault, Result};
-use sheetlight::geometry::{Axis, AxisKind, Base, Camera, Flange, Plane, Ray, Rigid, Sensor};
-use sheetlight::rig::{Calibration, HandEye, Kind, Rig};
+use sheetlight::geometry::{Axis, AxisKind, Frame, Rigid};
+use sheetlight::rig::{Calibration, Kind, Rig};
 use sheetlight::robot::Convention;
 use sheetlight::station::{Settings, Sigmas, Values, ValuesFormat, written_camera};
 use std::path::{Path, PathBuf};
@@ -195,19 +195,10 @@ fn make(a: &New, console: &Console) -> Result<()> {
 
 /// Seals a calibration that was edited.
 fn seal(a: &Seal, console: &Console) -> Result<()> {
-    let vouch = match a.kind {
-        Kind::Camera => Rig::vouch::<Intrinsics>,
-        Kind::LaserPlane => Rig::vouch::<Plane<Camera>>,
-        Kind::Pointer => Rig::vouch::<Ray<Camera>>,
-        Kind::BaseCamera => Rig::vouch::<Rigid<Base, Camera>>,
-        Kind::LinearAxis | Kind::Turntable => Rig::vouch::<Axis>,
-        Kind::ProfileHandEye => Rig::vouch::<Rigid<Flange, Sensor>>,
-        Kind::HandEye => Rig::vouch::<HandEye>,
-    };
     if a.because.trim().is_empty() {
         return Err(Fault::usage("--because says nothing").next("give the reason to trust the file"));
     }
-    let path = vouch(&a.station, a.kind, a.because.trim(), a.as_stated)?;
+    let path = Rig::vouch(&a.station, a.kind, a.because.trim(), a.as_stated)?;
     console.result(&path, &format!("{}: sealed; reports made with it say so", path.display()));
     stale(&a.station, console);
     Ok(())
@@ -241,13 +232,7 @@ fn summary(settings: &Settings, rig: &Rig) -> String {
         let (o, d) = (r.origin, r.direction);
         format!("through {:.3} {:.3} {:.3} mm along {:.6} {:.6} {:.6}", o.x, o.y, o.z, d.x, d.y, d.z)
     });
-    let hand_eye = line("hand-eye", &rig.hand_eye, |h| {
-        let n = Convention::Denso.write(h);
-        format!(
-            "{:.4} {:.4} {:.4} mm, RX {:.4} RY {:.4} RZ {:.4} degrees (R = Rz·Ry·Rx)",
-            n[0], n[1], n[2], n[3], n[4], n[5]
-        )
-    });
+    let hand_eye = line("hand-eye", &rig.hand_eye, pose);
     let axis = |kind: AxisKind, part| {
         let shown = |a: &Axis| {
             let (d, p) = (a.direction(), a.origin());
@@ -263,16 +248,33 @@ fn summary(settings: &Settings, rig: &Rig) -> String {
                 if kind == AxisKind::Linear { "" } else { &through }
             )
         };
-        // A missing axis is not listed, because most stations have a robot.
-        if Option::is_some(part) { line(kind.words(), part, shown) } else { String::new() }
+        if_there(kind.words(), part, shown)
     };
     let linear = axis(AxisKind::Linear, &rig.linear_axis);
     let turntable = axis(AxisKind::Turntable, &rig.turntable);
+    let base_camera = if_there("base camera", &rig.base_camera, pose);
+    let profile_hand_eye = if_there("profile hand-eye", &rig.profile_hand_eye, pose);
     let stale = rig.stale();
     let stale =
         stale.iter().map(|(kind, _)| format!("not used: the {} was measured with another camera\n", kind.words()));
     let stale: String = stale.collect();
-    format!("{}\n{camera}{plane}{pointer}{hand_eye}{linear}{turntable}{stale}", settings.name)
+    format!(
+        "{}\n{camera}{plane}{pointer}{hand_eye}{base_camera}{linear}{turntable}{profile_hand_eye}{stale}",
+        settings.name
+    )
+}
+
+fn pose<To: Frame, From: Frame>(pose: &Rigid<To, From>) -> String {
+    let n = Convention::Denso.write(pose);
+    format!(
+        "{:.4} {:.4} {:.4} mm, RX {:.4} RY {:.4} RZ {:.4} degrees (R = Rz·Ry·Rx)",
+        n[0], n[1], n[2], n[3], n[4], n[5]
+    )
+}
+
+/// Most stations have a robot that carries the camera. Of what others have, nothing is said where it is missing.
+fn if_there<T>(what: &str, calibration: &Option<Calibration<T>>, value: impl Fn(&T) -> String) -> String {
+    if calibration.is_some() { line(what, calibration, value) } else { String::new() }
 }
 
 fn line<T>(what: &str, calibration: &Option<Calibration<T>>, value: impl Fn(&T) -> String) -> String {

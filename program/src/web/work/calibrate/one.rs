@@ -7,15 +7,13 @@ use super::super::run::Run;
 use crate::web::guard::resolve;
 use crate::web::message::{CalibrationFigures, Job, JobState, Order, Outcome, Target};
 use serde::Serialize;
-use serde::de::DeserializeOwned;
 use sheetlight::calibrate::camera::procedure::{CameraOptions, calibrate as camera};
 use sheetlight::calibrate::camera::report::page;
 use sheetlight::calibrate::laser_plane::options::LaserPlaneOptions;
 use sheetlight::calibrate::report::Page;
 use sheetlight::fault::{Fault, Result};
-use sheetlight::geometry::{Base, Camera as CameraFrame, Rigid};
 use sheetlight::recording::Recording;
-use sheetlight::rig::{Calibration, Kind, Measured, Quality, Rig, Verdict};
+use sheetlight::rig::{Calibration, Kind, Quality, Rig, Verdict};
 use sheetlight::scan::Where;
 use sheetlight::station::volume::asked;
 use sheetlight::station::{
@@ -137,43 +135,37 @@ fn former(station: &Path, kind: Kind) -> BTreeMap<String, f64> {
 /// good enough, or a calibration that was accepted before.
 pub fn accept(jobs: &Jobs, job: &Job) -> Result<Job> {
     let refuse = |what: String| Err(Fault::usage(what).next("calibrate again"));
-    let target = match (&job.order, job.state) {
-        (Order::Calibrate(ask), JobState::Done) => Some(ask.target),
-        (Order::Joint(_) | Order::Auto(_), JobState::Done) => None,
+    let joint = match (&job.order, job.state) {
+        (Order::Calibrate(_), JobState::Done) => false,
+        (Order::Joint(_) | Order::Auto(_), JobState::Done) => true,
         _ => return refuse(format!("{}: is not a finished calibration", job.id)),
     };
     let mut job = job.clone();
-    let standing = match &mut job.outcome {
-        Some(Outcome::Calibrate(f) | Outcome::Joint(f) | Outcome::Auto(f)) if !f.accepted => {
-            f.accepted = true;
-            f.kind == Kind::BaseCamera.name()
-        }
+    match &mut job.outcome {
+        Some(Outcome::Calibrate(f) | Outcome::Joint(f) | Outcome::Auto(f)) if !f.accepted => f.accepted = true,
         _ => return refuse(format!("{}: was accepted already", job.id)),
-    };
+    }
     let (folder, station) = (jobs.folder(&job), &jobs.place.station);
     back_up_here(station, "before-calibration")?;
-    match target {
-        None => super::together::store(&folder, station)?,
-        Some(Target::Camera) => store::<sheetlight::camera::Intrinsics>(&folder, station)?,
-        Some(Target::HandEye) if standing => store::<Rigid<Base, CameraFrame>>(&folder, station)?,
-        Some(Target::HandEye) => store::<sheetlight::rig::HandEye>(&folder, station)?,
-        Some(Target::LaserPlane) => store::<sheetlight::geometry::Plane<CameraFrame>>(&folder, station)?,
-        Some(Target::Axis) => store::<sheetlight::geometry::Axis>(&folder, station)?,
-        Some(Target::Pointer) => store::<sheetlight::geometry::Ray<CameraFrame>>(&folder, station)?,
+    if joint {
+        super::together::store(&folder, station)?
+    } else {
+        store(&folder, station)?
     }
     jobs.put(&job)?;
     Ok(job)
 }
 
-fn store<T: Serialize + DeserializeOwned + Measured>(folder: &Path, station: &Path) -> Result<()> {
+fn store(folder: &Path, station: &Path) -> Result<()> {
     let path = folder.join(RESULT);
-    let c: Calibration<T> = serde_json::from_str(&sheetlight::files::read_text(&path)?)
+    let record = Rig::record(&sheetlight::files::read_text(&path)?)
         .map_err(|e| Fault::input(format!("{}: {e}", path.display())).next("calibrate again"))?;
-    if c.quality.verdict >= Verdict::BadlyDetermined {
-        return Err(Fault::refused(format!("the {} is {}", c.kind.words(), c.quality.verdict.words()))
-            .cause(c.quality.reasons.join("; "))
-            .next(c.quality.advice.first().map_or("take more pictures", String::as_str)));
+    let q = record.quality();
+    if q.verdict >= Verdict::BadlyDetermined {
+        return Err(Fault::refused(format!("the {} is {}", record.kind().words(), q.verdict.words()))
+            .cause(q.reasons.join("; "))
+            .next(q.advice.first().map_or("take more pictures", String::as_str)));
     }
     let page = sheetlight::files::read_text(&folder.join(PAGE))?;
-    Rig::store(station, &c, Some(&page)).map(|_| ())
+    Rig::store(station, record.as_ref(), Some(&page)).map(|_| ())
 }
