@@ -5,49 +5,22 @@ Frame and unit: s."""
 
 import json
 import os
-import shutil
-import socket
 import subprocess
 import sys
 import threading
 import time
 
+from mosquitto import LOGIN, Folder, Mosquitto, alarmed, connected, free_port, installed
 from server import Server
 from waits import until
 
 program, folder = sys.argv[1:3]
 TOPIC = "plant/cell3"
-LOGIN = ("station", "a password")
+FILES = None
 
 
 def file(name, text=None):
-    path = os.path.join(folder, name)
-    if text is not None:
-        with open(path, "w") as f:
-            f.write(text)
-    return path
-
-
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
-
-
-class Mosquitto:
-    """A broker that wants the login, in clear or with TLS."""
-
-    def __init__(self, port, tls=False):
-        lines = [f"listener {port} 127.0.0.1", "allow_anonymous false", f"password_file {file('passwords')}"]
-        if tls:
-            lines += [f"certfile {file('broker.pem')}", f"keyfile {file('broker.key')}"]
-        self.log = open(file(f"mosquitto-{port}.log"), "a")
-        command = [shutil.which("mosquitto") or "/usr/sbin/mosquitto", "-c", file(f"mosquitto-{port}.conf", "\n".join(lines) + "\n")]
-        self.process = subprocess.Popen(command, stdout=self.log, stderr=self.log)
-
-    def end(self):
-        self.process.terminate()
-        self.process.wait()
+    return FILES.file(name, text)
 
 
 class Subscriber:
@@ -78,20 +51,11 @@ class Subscriber:
         self.client.disconnect()
 
 
-def connected(s):
-    figures = s.ask("GET", "/api/v1/metrics")[2].decode()
-    return next((line.split()[-1] for line in figures.splitlines() if line.startswith("sheetlight_mqtt_connected")), None)
-
-
-def alarmed(s):
-    return [a for a in s.json("GET", "/bar")["alarms"] if "mqtt" in a]
-
-
 def published(mqtt, port):
     s = Server(program, folder, "--mqtt", f"mqtt://127.0.0.1:{port}", "--mqtt-topic", TOPIC, "--mqtt-login", file("login"))
     # The server starts without its broker, and says so.
     until("that the broker is missing", lambda: connected(s) == "0" and alarmed(s))
-    broker = Mosquitto(port)
+    broker = Mosquitto(FILES, port)
     until("the broker", lambda: connected(s) == "1" and not alarmed(s))
     reader = Subscriber(mqtt, port)
     until("online", lambda: reader.last("state") == "online")
@@ -103,6 +67,12 @@ def published(mqtt, port):
     assert result == job and result["outcome"]["lines"], (result, job)
     states = [json.loads(text)["state"] for text in reader.all("job/check")]
     assert states[-1] == "done" and len(states) == len(set(states)) >= 2, states
+    # A long result, with the part's outline and its pose in all notations, arrives whole.
+    scan = s.job({"procedure": "scan", "recording": "scan"})
+    found = s.job({"procedure": "find", "scans": [scan["id"]], "recipe": "led"})
+    text = until("the part", lambda: reader.last("result/find"))
+    assert json.loads(text) == found, (text, found)
+    print(f"a result of {len(text)} bytes")
     (link,) = s.json("GET", "/settings")["connections"]
     assert link["door"] == "mqtt" and link["problem"] is None and link["lost"] == 0 and link["sent"] >= len(states), link
     # Who subscribes later gets what is kept, and no old changes.
@@ -126,7 +96,7 @@ def published(mqtt, port):
     until("that the broker is gone", lambda: connected(s) == "0" and alarmed(s))
     lost = s.job({"procedure": "check"})
     assert lost["state"] == "done"
-    broker = Mosquitto(port)
+    broker = Mosquitto(FILES, port)
     until("the broker again", lambda: connected(s) == "1")
     reader = Subscriber(mqtt, port)
     until("online again", lambda: reader.last("state") == "online" and reader.last("status"))
@@ -140,7 +110,7 @@ def published(mqtt, port):
 
 
 def refused_login(port):
-    broker = Mosquitto(port)
+    broker = Mosquitto(FILES, port)
     s = Server(program, folder, "--mqtt", f"mqtt://127.0.0.1:{port}", "--mqtt-login", file("wrong"))
     why = until("why it is not connected", lambda: connected(s) == "0" and [a for a in alarmed(s) if "does not answer" in a])
     assert LOGIN[1] not in why[0] and "a wrong one" not in why[0], why
@@ -151,7 +121,7 @@ def refused_login(port):
 
 
 def encrypted(mqtt, port):
-    broker = Mosquitto(port, tls=True)
+    broker = Mosquitto(FILES, port, tls=True)
     more = ("--mqtt", f"mqtts://localhost:{port}", "--mqtt-topic", TOPIC, "--mqtt-login", file("login"))
     s = Server(program, folder, *more, "--mqtt-ca", file("ca.pem"))
     until("the encrypted broker", lambda: connected(s) == "1")
@@ -178,7 +148,8 @@ def certificates():
 
 
 def main():
-    if not (shutil.which("mosquitto") or os.path.exists("/usr/sbin/mosquitto")):
+    global FILES
+    if not installed():
         print("mosquitto is not installed (tools/cameras.sh)")
         sys.exit(77)
     try:
@@ -186,13 +157,7 @@ def main():
     except ImportError as e:
         print(f"{e} (make python)")
         sys.exit(77)
-    file("login", "\n".join(LOGIN) + "\n")
-    file("wrong", f"{LOGIN[0]}\na wrong one\n")
-    tool = shutil.which("mosquitto_passwd") or "/usr/bin/mosquitto_passwd"
-    subprocess.run([tool, "-b", "-c", file("passwords"), *LOGIN], check=True, capture_output=True)
-    # The broker drops root's rights before it reads them.
-    for path in (file("passwords"), folder):
-        os.chmod(path, 0o755)
+    FILES = Folder(folder)
     certificates()
     for words, part in ((["--mqtt", "http://x"], "not the address"), (["--mqtt", "mqtt://10.0.0.7", "--mqtt-login", file("login")], "in clear")):
         run = subprocess.run([program, "station", "serve", "--station", file("station"), *words], capture_output=True, text=True, timeout=60)

@@ -11,6 +11,10 @@ use std::time::Duration;
 const KEEP_ALIVE: Duration = Duration::from_secs(10);
 const PLAIN_PORT: u16 = 1883;
 const TLS_PORT: u16 = 8883;
+/// Longest packet that is read, bytes: nothing is subscribed to.
+const LONGEST_READ: usize = 10 << 10;
+/// Longest packet that MQTT has. The client library's own limit, 10 KiB, is less than the result of a job may have.
+const LONGEST_SENT: usize = (256 << 20) - 1;
 
 /// A broker, and the topic below which everything is published.
 #[derive(Clone)]
@@ -100,7 +104,7 @@ impl Broker {
     pub(super) fn options(&self) -> MqttOptions {
         let client = format!("sheetlight-{}", &random_hex()[..12]);
         let mut options = MqttOptions::new(client, &self.host, self.port);
-        options.set_keep_alive(KEEP_ALIVE);
+        options.set_keep_alive(KEEP_ALIVE).set_max_packet_size(LONGEST_READ, LONGEST_SENT);
         options.set_last_will(LastWill::new(self.topic("state"), "offline", QoS::AtLeastOnce, true));
         if let Some((name, password)) = &self.login {
             options.set_credentials(name, password);
