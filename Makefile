@@ -105,11 +105,13 @@ cameras:
 	tools/cameras.sh
 
 # The scorer of the reference data and the comparisons need numpy, scipy and libigl. The Python package needs maturin,
-# mypy and pytest; its files and notebooks need what other programs read and show them with.
+# mypy and pytest; its files and notebooks need what other programs read and show them with. Sparkplug's reader stands
+# in an environment inside this one.
 python:
 	tools/python-env.sh $(VENV) test
 	tools/python-env.sh $(VENV) files
 	tools/python-env.sh $(VENV) genicam
+	tools/python-env.sh $(VENV)/sparkplug sparkplug
 
 # The figures of docs/python.md: the last one of each notebook, with this Python package, installed aside.
 SITE := $(abspath $(TARGET))/site

@@ -79,6 +79,7 @@ const HOMES: &[(&str, &str)] = &[
     ("parquet", "station"),
     ("png", "raster"),
     ("pollster", "gpu"),
+    ("prost", "web"),
     ("rpassword", "cli"),
     ("rs_opw_kinematics", "cell"),
     ("rumqttc", "web"),

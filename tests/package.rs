@@ -150,7 +150,7 @@ fn built_from(features: &[&str]) -> BTreeSet<String> {
 #[test]
 fn the_engine_needs_no_server_and_no_command_line_and_alone_no_pages() {
     let whole = built_from(&[]);
-    for name in ["argon2", "axum", "clap", "indicatif", "mcap", "rumqttc", "rust-embed", "schemars", "ts-rs"] {
+    for name in ["argon2", "axum", "clap", "indicatif", "mcap", "prost", "rumqttc", "rust-embed", "schemars", "ts-rs"] {
         assert!(!whole.contains(name), "{name}");
     }
     let alone = built_from(&["--no-default-features"]);

@@ -103,6 +103,12 @@ fn state_and_results_reach_a_broker_which_orders_nothing() {
 }
 
 #[test]
+fn a_host_application_reads_the_station_as_a_node_and_orders_only_births() {
+    let dir = copy();
+    python("tests/web/sparkplug.py", &[program(), dir.path().to_str().unwrap()]);
+}
+
+#[test]
 fn a_plc_starts_and_follows_insertions_that_only_the_screen_confirms() {
     let [cell, recorded] = [tempfile::tempdir().unwrap(), copy()];
     // The long form inserts every part, and sends more random frames.

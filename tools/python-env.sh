@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# Makes a Python environment with a set of packages (test, files, genicam, peers) in a folder: for judges, peers and the
-# tests of the Python package. `genicam` has a GenICam program, which tests the GenTL producer. `files` has what its
-# files, conversions, notebooks and tables need and are read again with: 0.7 GB, half of them OpenCV and Arrow. Ray
-# (0.25 GB) is installed by hand: pip install ray. Sheetlight itself never needs Python; without one the tests that need
-# it say that they were skipped.
+# Makes a Python environment with a set of packages (test, files, genicam, sparkplug, peers) in a folder: for judges,
+# peers and the tests of the Python package. `genicam` has a GenICam program, which tests the GenTL producer. `sparkplug`
+# has a reader of Sparkplug B; it needs a folder of its own, because it asks for an older paho-mqtt than `files` has.
+# `files` has what its files, conversions, notebooks and tables need and are read again with: 0.7 GB, half of them OpenCV
+# and Arrow. Ray (0.25 GB) is installed by hand: pip install ray. Sheetlight itself never needs Python; without one the
+# tests that need it say that they were skipped.
 set -eu
 folder=$1 set=$2
 case $set in
@@ -12,8 +13,9 @@ case $set in
     packages="$packages pye57 asyncua==2.1.* eclipse-zenoh==1.* paho-mqtt==2.* pymodbus==3.16.* pypcd4 rosbags"
     packages="$packages tifffile trimesh xarray xxhash openapi-python-client==0.29.*;python_version>='3.11'" ;;
   genicam) packages="harvesters==1.4.* numpy" ;;
+  sparkplug) packages="pysparkplug==0.6.*" ;;
   peers) packages="numpy scipy numba opencv-contrib-python-headless==4.14.*" ;;
-  *) echo "python-env.sh: unknown set '$set': test, files, genicam or peers" >&2; exit 2 ;;
+  *) echo "python-env.sh: unknown set '$set': test, files, genicam, sparkplug or peers" >&2; exit 2 ;;
 esac
 # Holds the packages, so that an environment of a former version gets what is new.
 stamp="$folder/.has-$set"

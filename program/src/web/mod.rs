@@ -27,7 +27,7 @@ mod track;
 mod work;
 
 pub use api::openapi;
-pub use event::Broker;
+pub use event::{Broker, Names};
 pub use for_cell::station_for;
 pub use guard::{hashed, random_hex};
 pub use message::{Mode, declarations};

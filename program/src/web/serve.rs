@@ -4,14 +4,14 @@
 
 use super::api::router;
 use super::camera::Camera;
-use super::event::{Broker, Hub, publish};
+use super::event::{Broker, Hub, Source, publish, publish_node};
 use super::guard::{Door, Doorway, Hosts, Peer, Sessions, Tries, door, tls, verify};
 use super::message::Event;
 use super::motion::{Desk, Links, SimulatedRobot};
 use super::plc;
 use super::port::listen;
 use super::robot::Robot;
-use super::screen::Screen;
+use super::screen::{JOBS, Screen};
 use super::work::{Jobs, Place, Worker};
 use crate::web::message::Mode;
 use axum::middleware::from_fn_with_state;
@@ -183,7 +183,7 @@ async fn run(
     // Adapters are queried before the first page needs them.
     tokio::task::spawn_blocking(move || first.bar());
     if let Some(broker) = options.mqtt.clone() {
-        tokio::spawn(publish(broker, screen.hub.clone()));
+        told(broker, &screen);
     }
     // Before anybody is told of it: an address that is not available ends the start. It closes with this function.
     let plcs = options.modbus.map(|at| plc::Door::open(at, screen.clone())).transpose()?;
@@ -199,6 +199,21 @@ async fn run(
     tokio::select! {
         served = axum::serve(doorway, app).into_future() => served.map_err(lost),
         () = asked => Ok(()),
+    }
+}
+
+/// Publishes what happens at a broker.
+fn told(broker: Broker, screen: &Screen) {
+    let hub = screen.hub.clone();
+    match broker.names().cloned() {
+        None => drop(tokio::spawn(publish(broker, hub))),
+        Some(names) => {
+            let camera = screen.camera().cloned();
+            let rate_hz = move || camera.as_ref().and_then(|camera| camera.rate_hz());
+            let jobs = screen.jobs.clone();
+            let source = Source { hub, jobs: move || jobs.list(JOBS), rate_hz };
+            drop(tokio::spawn(publish_node(broker, names, source)));
+        }
     }
 }
 

@@ -5,7 +5,7 @@
 use crate::cli::terminal::console::Console;
 use crate::cli::terminal::interrupt;
 use crate::web::{
-    Broker, Mode, Secured, ServeOptions, SimulatedOptions, SimulatedRobot, hashed, random_hex, serve, simulated,
+    Broker, Mode, Names, Secured, ServeOptions, SimulatedOptions, SimulatedRobot, hashed, random_hex, serve, simulated,
 };
 use sheetlight::fault::{Fault, Result};
 use sheetlight::scan::RawFormat;
@@ -87,6 +87,9 @@ pub struct Serve {
     /// First topic levels [default: sheetlight/ and the folder's name]
     #[arg(long, value_name = "TOPIC", requires = "mqtt")]
     mqtt_topic: Option<String>,
+    /// Publish Sparkplug B instead of JSON, as this node of a group
+    #[arg(long, value_name = "GROUP/NODE", requires = "mqtt", conflicts_with = "mqtt_topic")]
+    mqtt_sparkplug: Option<String>,
     /// Name and password for the broker, on two lines
     #[arg(long, value_name = "FILE", requires = "mqtt")]
     mqtt_login: Option<PathBuf>,
@@ -186,7 +189,12 @@ fn broker(args: &Serve) -> Result<Option<Broker>> {
     let topic = args.mqtt_topic.clone().unwrap_or_else(|| format!("sheetlight/{}", folder()));
     let login = args.mqtt_login.as_deref().map(sheetlight::files::read_text).transpose()?;
     let authority = args.mqtt_ca.as_deref().map(|file| sheetlight::files::read(file, CA_BYTES)).transpose()?;
-    Broker::new(uri, &topic, login.as_deref(), authority.as_deref()).map(Some)
+    let broker = Broker::new(uri, &topic, login.as_deref(), authority.as_deref())?;
+    let names = args.mqtt_sparkplug.as_deref().map(Names::new).transpose()?;
+    Ok(Some(match names {
+        Some(names) => broker.as_node(names),
+        None => broker,
+    }))
 }
 
 /// The token in a file. A short one could be guessed.

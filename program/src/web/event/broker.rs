@@ -1,9 +1,9 @@
-//! In: an MQTT broker's address, login and certificate, as a person gives them. Out: where and as whom the station
-//! publishes.
+//! In: an MQTT broker's address, login and certificate, as a person gives them. Out: where, as whom and in which form
+//! the station publishes.
 //! Frame and unit: none.
 
-use crate::web::guard::random_hex;
-use rumqttc::{LastWill, MqttOptions, QoS, TlsConfiguration, Transport};
+use super::Names;
+use rumqttc::{LastWill, MqttOptions, TlsConfiguration, Transport};
 use sheetlight::fault::{Fault, Result};
 use std::time::Duration;
 
@@ -11,8 +11,8 @@ use std::time::Duration;
 const KEEP_ALIVE: Duration = Duration::from_secs(10);
 const PLAIN_PORT: u16 = 1883;
 const TLS_PORT: u16 = 8883;
-/// Longest packet that is read, bytes: nothing is subscribed to.
-const LONGEST_READ: usize = 10 << 10;
+/// Longest packet that is read, bytes. A longer one ends the connection.
+const LONGEST_READ: usize = 4 << 20;
 /// Longest packet that MQTT has. The client library's own limit, 10 KiB, is less than the result of a job may have.
 const LONGEST_SENT: usize = (256 << 20) - 1;
 
@@ -25,6 +25,8 @@ pub struct Broker {
     tls: Option<Option<Vec<u8>>>,
     login: Option<(String, String)>,
     topic: String,
+    /// Published as a node of Sparkplug B instead of below the topic.
+    names: Option<Names>,
 }
 
 impl std::fmt::Debug for Broker {
@@ -85,7 +87,17 @@ impl Broker {
                 .next("use mqtts://, with --mqtt-ca FILE if the plant signs its own certificates"));
         }
         let tls = encrypted.then(|| authority.map(<[u8]>::to_vec));
-        Ok(Broker { host: host.to_owned(), port, tls, login, topic: topic.to_owned() })
+        Ok(Broker { host: host.to_owned(), port, tls, login, topic: topic.to_owned(), names: None })
+    }
+
+    /// The same broker, at which the station is a node of Sparkplug B.
+    pub fn as_node(self, names: Names) -> Broker {
+        Broker { names: Some(names), ..self }
+    }
+
+    /// The node of Sparkplug B, if the station is one.
+    pub fn names(&self) -> Option<&Names> {
+        self.names.as_ref()
     }
 
     /// The broker's address, for messages.
@@ -100,12 +112,11 @@ impl Broker {
         format!("{}/{of}", self.topic)
     }
 
-    /// How to connect. If the connection is lost, the broker itself publishes `offline`.
-    pub(super) fn options(&self) -> MqttOptions {
-        let client = format!("sheetlight-{}", &random_hex()[..12]);
+    /// How to connect, by a name of the connection. If it is lost, the broker itself publishes the will.
+    pub(super) fn options(&self, client: String, will: LastWill) -> MqttOptions {
         let mut options = MqttOptions::new(client, &self.host, self.port);
-        options.set_keep_alive(KEEP_ALIVE).set_max_packet_size(LONGEST_READ, LONGEST_SENT);
-        options.set_last_will(LastWill::new(self.topic("state"), "offline", QoS::AtLeastOnce, true));
+        options.set_keep_alive(KEEP_ALIVE);
+        options.set_last_will(will).set_max_packet_size(LONGEST_READ, LONGEST_SENT);
         if let Some((name, password)) = &self.login {
             options.set_credentials(name, password);
         }

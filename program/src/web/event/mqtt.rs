@@ -3,7 +3,8 @@
 //! Frame and unit: those of the events.
 
 use super::{Broker, Hub};
-use rumqttc::{AsyncClient, Event, EventLoop, Packet, QoS};
+use crate::web::guard::random_hex;
+use rumqttc::{AsyncClient, Event, EventLoop, LastWill, Packet, QoS};
 use serde_json::Value;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -11,9 +12,9 @@ use std::time::Duration;
 use tokio::sync::broadcast::{Receiver, error::RecvError};
 
 /// Messages that wait for a broker; what comes while all places are taken is not sent.
-const WAITING: usize = 64;
+pub(super) const WAITING: usize = 64;
 /// First and longest wait before the next attempt to connect.
-const AGAIN: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(30)];
+pub(super) const AGAIN: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(30)];
 
 /// Name of this door among the links.
 pub const DOOR: &str = "mqtt";
@@ -21,7 +22,9 @@ pub const DOOR: &str = "mqtt";
 /// Publishes until the server ends. A slow or missing broker delays nothing.
 pub async fn publish(broker: Broker, hub: Arc<Hub>) {
     let events = hub.listen();
-    let (client, connection) = AsyncClient::new(broker.options(), WAITING);
+    let name = format!("sheetlight-{}", &random_hex()[..12]);
+    let will = LastWill::new(broker.topic("state"), "offline", QoS::AtLeastOnce, true);
+    let (client, connection) = AsyncClient::new(broker.options(name, will), WAITING);
     hub.link(DOOR, |link| {
         link.address = broker.name();
         link.problem = Some(format!("{} was not reached yet", broker.name()));
