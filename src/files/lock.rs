@@ -47,6 +47,17 @@ impl Lock {
         file.lock().map_err(|e| Fault::write(&path, e))?;
         Ok(Lock { _file: file })
     }
+
+    /// Whether a process holds the lock now.
+    pub fn is_held(folder: &Path, name: &str) -> bool {
+        let path = folder.join(format!("{name}.lock"));
+        // Opening a pipe would wait for its other end.
+        if !std::fs::symlink_metadata(&path).is_ok_and(|m| m.is_file()) {
+            return false;
+        }
+        // A shared lock for a moment: who takes the lock just then tries again.
+        File::open(path).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+    }
 }
 
 fn open(folder: &Path, name: &str) -> Result<(PathBuf, File)> {
@@ -70,7 +81,9 @@ mod tests {
         let first = Lock::take(dir.path(), "scan", "scan").unwrap();
         let said = Lock::take(dir.path(), "scan", "scan").err().unwrap();
         assert!(said.what.contains("another scan") && !said.next.is_empty(), "{said}");
+        assert!(Lock::is_held(dir.path(), "scan") && !Lock::is_held(dir.path(), "other"));
         drop(first);
+        assert!(!Lock::is_held(dir.path(), "scan"));
         // Neither the content of the file nor its owner makes it a held lock.
         std::fs::write(dir.path().join("scan.lock"), "1").unwrap();
         Lock::take(dir.path(), "scan", "scan").unwrap();

@@ -13,6 +13,6 @@ mod space;
 pub use backlog::{Backlog, Handing, Recorded, Waits};
 pub use poses::record_poses;
 pub use profiles::{Rows, record_profiles};
-pub use recorder::{Kept, Recorder, RecorderOptions, Shows, Store};
+pub use recorder::{Kept, Recorder, RecorderOptions, Shows, Store, is_recorded_into};
 pub use run::{Exposed, Recording as RecordReport, record};
 pub use space::Space;

@@ -76,6 +76,8 @@ const SYNC: Duration = Duration::from_secs(1);
 const HURRY: usize = 4;
 const FRAMES: &str = "frames.jsonl";
 const RAW: &str = "pictures.raw";
+/// Name of the lock that a recorder holds on its folder.
+const LOCK: &str = "record";
 
 /// Where a picture was stored.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,6 +86,11 @@ pub struct Kept {
     pub name: String,
     /// Index in the recording, from 0.
     pub index: usize,
+}
+
+/// Whether a recorder writes into this folder now.
+pub fn is_recorded_into(folder: &Path) -> bool {
+    Lock::is_held(folder, LOCK)
 }
 
 /// A recording that is being written.
@@ -107,7 +114,7 @@ impl Recorder {
     /// A folder that holds a recording, that another recorder writes into, or that cannot be written.
     pub fn create(folder: &Path, format: Format, options: RecorderOptions) -> Result<Recorder> {
         crate::files::make_folder(folder)?;
-        let lock = Lock::take(folder, "record", "recorder")?;
+        let lock = Lock::take(folder, LOCK, "recorder")?;
         let meta_path = folder.join("meta.json");
         if meta_path.exists() || folder.join(FRAMES).exists() {
             return Err(Fault::output(format!("{}: holds a recording", folder.display()))

@@ -4,8 +4,8 @@
 use super::answer::{Answer, beside, body, json, operates};
 use crate::web::guard::{Tab, resolve};
 use crate::web::message::{
-    Bar, BoardView, DrawingAsk, DrawingRead, PictureRef, PointsChange, PointsChanged, PointsOf, Problem, RecipeAsk,
-    RecipePoint, RecipeText, RecordingInfo, StationInfo, ViewRef,
+    Bar, BoardView, DrawingAsk, DrawingRead, PictureRef, PointsChange, PointsChanged, PointsOf, RecipeAsk, RecipePoint,
+    RecipeText, RecordingInfo, StationInfo, ViewRef,
 };
 use crate::web::screen::Screen;
 use crate::web::{station, work};
@@ -16,14 +16,8 @@ use axum::response::IntoResponse;
 use axum::{Extension, Json};
 use sheetlight::fault::{Fault, Result};
 use sheetlight::raster::{Image, png};
-use sheetlight::recording::{Beam, MotionKind, Recording};
-use std::path::Path;
+use sheetlight::recording::Recording;
 use std::sync::Arc;
-
-/// Depth to which folders below the recordings' root are searched.
-const DEEPEST: usize = 3;
-/// Most recordings that are listed.
-const MOST: usize = 500;
 
 /// GET /station
 pub async fn station(State(screen): State<Arc<Screen>>) -> Answer<Json<StationInfo>> {
@@ -37,63 +31,7 @@ pub async fn bar(State(screen): State<Arc<Screen>>) -> Answer<Json<Bar>> {
 
 /// GET /recordings
 pub async fn recordings(State(screen): State<Arc<Screen>>) -> Answer<Json<Vec<RecordingInfo>>> {
-    json(screen, |s| {
-        let mut found = Vec::new();
-        list(&s.place.recordings, "", DEEPEST, &mut found)?;
-        found.sort_by_key(|r: &RecordingInfo| sheetlight::files::natural(&r.name));
-        Ok(found)
-    })
-    .await
-}
-
-fn list(folder: &Path, name: &str, depth: usize, out: &mut Vec<RecordingInfo>) -> Result<()> {
-    if folder.join("meta.json").is_file() {
-        out.push(info(folder, name));
-        return Ok(());
-    }
-    let entries = std::fs::read_dir(folder).map_err(|e| Fault::read(folder, e))?;
-    for entry in entries.flatten().filter(|_| depth > 0) {
-        let word = entry.file_name().to_string_lossy().into_owned();
-        // Links are not followed: they may lead outside or form a cycle.
-        if crate::web::guard::plain(&word) && entry.file_type().is_ok_and(|t| t.is_dir()) && out.len() < MOST {
-            let below = if name.is_empty() { word } else { format!("{name}/{word}") };
-            // A folder that cannot be read is skipped; the others are listed.
-            let _ = list(&entry.path(), &below, depth - 1, out);
-        }
-    }
-    Ok(())
-}
-
-fn info(folder: &Path, name: &str) -> RecordingInfo {
-    match Recording::open(folder) {
-        Ok(r) => RecordingInfo {
-            name: name.into(),
-            set: r.meta.set.clone(),
-            frames: r.meta.frames.len(),
-            width: r.meta.image.width,
-            height: r.meta.image.height,
-            beam: r.meta.beam.map(|b| if b == Beam::Line { "line" } else { "pointer" }.to_owned()),
-            board: r.meta.board.is_some() || !r.meta.boards.is_empty(),
-            motion: match r.meta.motion().kind {
-                MotionKind::Robot => "robot",
-                MotionKind::Linear => "linear",
-                MotionKind::Turntable => "turntable",
-            }
-            .into(),
-            problem: None,
-        },
-        Err(fault) => RecordingInfo {
-            name: name.into(),
-            set: String::new(),
-            frames: 0,
-            width: 0,
-            height: 0,
-            beam: None,
-            board: false,
-            motion: String::new(),
-            problem: Some(Problem::from(&fault)),
-        },
-    }
+    json(screen, |s| s.place.listed()).await
 }
 
 /// A picture of a recording, at its original depth.
