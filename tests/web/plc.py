@@ -4,8 +4,10 @@ conditions of the screen, if it starts anything without them or moves anything i
 the screen's own interface and the cell's truth say.
 Frame and unit: mm, degrees; s."""
 
+import json
 import os
 import random
+import shutil
 import socket
 import subprocess
 import sys
@@ -14,7 +16,7 @@ import time
 
 import registers
 from hands import Operator
-from registers import DONE, FAILED, FIND, GIVE, INSERT, POSE, RUNS, SCAN, STOP, STOPPED, Plc, plain
+from registers import AXIS, CALIBRATE, CAMERA, DONE, FAILED, FIND, GIVE, INSERT, LASER_PLANE, POSE, RUNS, SCAN, STOP, STOPPED, Plc, plain
 from server import Server, events
 from waits import PATIENCE, until
 
@@ -51,11 +53,12 @@ def refusals(s, plc, op):
     job = plc.job()
     assert (job.linked, job.armed, job.attended, job.state, job.number) == (True, False, False, 0, 0), job
     refused(s, plc, 9, "the robot is not armed", INSERT)
-    refused(s, plc, 3, "INSERT scans", SCAN)
+    refused(s, plc, 4, "osc: is not there", SCAN)
+    refused(s, plc, 4, "osc: is not there", CALIBRATE, CAMERA)
     refused(s, plc, 3, "INSERT scans", POSE)
     refused(s, plc, 3, "found nothing yet", GIVE, 1, 0)
     refused(s, plc, 3, "no scan is finished", FIND)
-    refused(s, plc, 1, "are requests", 7)
+    refused(s, plc, 1, "are requests", 8)
     op.arm()
     until("the armed robot", lambda: plc.job().armed and plc.job().attended)
     plc.recipe("../osc")
@@ -285,22 +288,122 @@ def simulated():
     assert again.end() == 0
 
 
+def last(s):
+    return s.json("GET", "/jobs")[0]
+
+
+def cut(name, frames, to):
+    """A copy of a recording with its first frames, begun now."""
+    copy = shutil.copytree(os.path.join(recorded, name), os.path.join(recorded, to))
+    path = os.path.join(copy, "meta.json")
+    with open(path) as f:
+        meta = json.load(f)
+    meta["frames"] = meta["frames"][:frames]
+    with open(path, "w") as f:
+        json.dump(meta, f)
+
+
+def made(s, plc, *request):
+    """Orders a scan or a calibration, and waits for its end. Returns registers and record of its job, which agree."""
+    s.json("POST", "/lease")
+    ended = plc.job().ended
+    error, said, _ = plc.ask(*request)
+    assert error == 0, (error, said)
+    # Taken at once, not when it has begun.
+    assert plc.made().recording == last(s)["order"]["recording"], plc.made()
+    for other in ([SCAN], [CALIBRATE, CAMERA]):
+        error, said, _ = plc.ask(*other)
+        assert error == 6 and f"{last(s)['id']} runs or waits" in said, (other, error, said)
+    job = until("its end", lambda: (lambda j: j if j.ended > ended else None)(plc.job()), 5 * PATIENCE)
+    stored, of = last(s), plc.made()
+    assert job.number == int(stored["id"].split("-")[0]) and (job.procedure, job.step, job.asks) == (request[0], "", ""), job
+    assert of.recording == stored["order"]["recording"] and (job.found, job.ended) == (0, ended + 1), (of, job)
+    assert (job.state == DONE) == (stored["state"] == "done"), (job, stored)
+    return job, of, stored
+
+
+def scanned(s, plc):
+    """Scans and calibrations from recordings: by name or the newest one, with a screen that operates, nothing outside their
+    folder; nothing is stored in the station."""
+    station = os.path.join(recorded, "station", "calibration")
+    calibrations = lambda: {f: open(os.path.join(station, f), "rb").read() for f in sorted(os.listdir(station))}
+    before = calibrations()
+    plc.recipe("scan")
+    s.json("POST", "/lease/release")
+    refused(s, plc, 10, "no screen operates", SCAN)
+    refused(s, plc, 10, "no screen operates", CALIBRATE, CAMERA)
+    s.json("POST", "/lease")
+    for name, code, words in [
+        ("none", 4, "none: is not there"),
+        ("scan/none", 4, "is not there"),
+        ("..", 1, "invalid file name"),
+        ("../recorded/scan", 1, "invalid file name"),
+        ("scan/../../etc", 1, "invalid file name"),
+        ("/etc", 1, "invalid file name"),
+        ("scan\\..", 1, "invalid file name"),
+        (" scan", 1, "invalid file name"),
+        ("pr\u00fcfung", 1, "plain ASCII"),
+        ("sc\nan", 1, "plain ASCII"),
+    ]:
+        plc.recipe(name)
+        refused(s, plc, code, words, SCAN)
+        refused(s, plc, code, words, CALIBRATE, CAMERA)
+    plc.recipe("intrinsics")
+    for target in (0, 6, 65535):
+        refused(s, plc, 1, f"register 2 is {target}, 1 to 5 are camera", CALIBRATE, target)
+    plc.recipe("")
+    refused(s, plc, 4, "no complete recording of boards", CALIBRATE, AXIS)
+    cut("scan", 20, "a-newer-one")
+    cut("intrinsics", 5, "boards")
+    cut("intrinsics", 2, "few")
+    job, of, stored = made(s, plc, SCAN)
+    assert of.recording == "a-newer-one" and job.error == 0, (of, job)
+    figures = stored["outcome"]
+    assert (of.shots, of.points, of.verdict, of.target) == (figures["shots"], figures["points"], "none", 0), (of, figures)
+    assert of.shots == 20 and of.points > 100, of
+    # Two pictures: nobody may accept that, and the job has an error.
+    job, of, stored = made(s, plc, CALIBRATE, CAMERA)
+    assert (of.recording, of.verdict, job.state, job.error) == ("few", "badly determined", DONE, 4), (of, job, stored)
+    assert job.words.startswith("the calibration is badly determined: 2 pictures"), job
+    assert s.ask("POST", f"/api/v1/jobs/{stored['id']}/accept")[0] >= 400
+    plc.recipe("boards")
+    job, of, stored = made(s, plc, CALIBRATE, CAMERA)
+    figures = stored["outcome"]
+    assert (job.error, of.target, of.verdict) == (0, CAMERA, figures["verdict"]), (job, of, figures)
+    assert of.verdict in ("good", "usable") and not figures["accepted"] and (of.shots, of.points) == (0, 0), (of, figures)
+    # A recording that is no calibration's: the job says so in its own words.
+    plc.recipe("scan")
+    job, of, stored = made(s, plc, CALIBRATE, LASER_PLANE)
+    assert (job.state, of.verdict, of.target) == (FAILED, "none", LASER_PLANE), (job, of)
+    assert job.error in (4, 14) and job.words == plain(stored["problem"]["what"]), (job, stored["problem"])
+    assert calibrations() == before, "a calibration was stored that nobody accepted"
+    job, of, stored = made(s, plc, SCAN)
+    assert (of.recording, job.error, of.points) == ("scan", 0, stored["outcome"]["points"]), (of, job)
+
+
 def found():
     """A search without insertion, in the last scan of the screen; the door open to other machines."""
     s = Server(program, recorded, "--recordings", recorded, "--modbus", "0.0.0.0:0")
     until("the warning", lambda: "Modbus has no login" in "".join(s.said))
     port = int(door(s)["address"].rsplit(":", 1)[1])
     plc = Plc(port)
+    before = plc.job()
     assert s.job({"procedure": "scan", "recording": "scan"})["state"] == "done"
+    # A scan of the screen takes the place of nothing that a PLC may ask for.
+    assert vars(plc.job()) == vars(before), before
+    scanned(s, plc)
     plc.recipe("led")
     s.json("POST", "/lease/release")
     refused(s, plc, 10, "no screen operates", FIND)
     refused(s, plc, 9, "without --robot", INSERT)
     s.json("POST", "/lease")
+    ended, scan = plc.job().ended, last(s)
     assert plc.ask(FIND)[0] == 0
-    job = until("the search", lambda: (lambda j: j if j.state == DONE else None)(plc.job()))
-    stored = s.json("GET", "/jobs")[0]
-    assert (job.procedure, job.step, job.error, job.inserted, job.ended) == (FIND, "", 0, 0, 1), job
+    job = until("the search", lambda: (lambda j: j if j.ended > ended else None)(plc.job()))
+    stored = last(s)
+    assert (job.procedure, job.step, job.error, job.inserted, job.state) == (FIND, "", 0, 0, DONE), job
+    assert stored["order"]["scans"] == [scan["id"]] and scan["order"]["procedure"] == "scan", (stored["order"], scan)
+    assert vars(plc.made()) == {"target": 0, "verdict": "none", "shots": 0, "points": 0, "recording": ""}, plc.made()
     agree(job, stored["outcome"])
     # Without [tool] the flange is not known.
     error, said, _ = plc.ask(GIVE, 1, 1)
@@ -308,8 +411,8 @@ def found():
     # A part that is not in the scan.
     plc.recipe("dimm")
     assert plc.ask(FIND)[0] == 0
-    job = until("the search", lambda: (lambda j: j if j.ended == 2 else None)(plc.job()))
-    stored = s.json("GET", "/jobs")[0]
+    job = until("the search", lambda: (lambda j: j if j.ended > ended + 1 else None)(plc.job()))
+    stored = last(s)
     assert job.error == 4 and job.found != 1 and job.words, (job, stored["problem"])
     if stored["problem"]:
         assert job.words == plain(stored["problem"]["what"])

@@ -4,7 +4,9 @@ Frame and unit: mm, degrees; standard deviations in mm and degrees."""
 
 import time
 
-SCAN, POSE, FIND, GIVE, INSERT, STOP = 1, 2, 3, 4, 5, 6
+SCAN, POSE, FIND, GIVE, INSERT, STOP, CALIBRATE = 1, 2, 3, 4, 5, 6, 7
+CAMERA, HAND_EYE, LASER_PLANE, POINTER, AXIS = 1, 2, 3, 4, 5
+VERDICTS = ["none", "good", "usable", "badly determined", "refused"]
 WAITS, RUNS, DONE, FAILED, STOPPED, CUT_OFF = 1, 2, 3, 4, 5, 6
 STEPS = ["", "touch", "scan", "find", "approach", "insert", "retract", "done", "backed out"]
 # By bit, as the document lists them.
@@ -43,6 +45,18 @@ class Job:
         return str(vars(self))
 
 
+class Made:
+    """Registers 255 to 361: what a scan or calibration made of its recording."""
+
+    def __init__(self, registers):
+        self.target, self.verdict = registers[0], VERDICTS[registers[1]]
+        self.shots, self.points = (registers[k] << 16 | registers[k + 1] for k in (2, 4))
+        self.recording = b"".join(r.to_bytes(2, "big") for r in registers[7:])[: registers[6]].decode("ascii")
+
+    def __repr__(self):
+        return str(vars(self))
+
+
 class Plc:
     def __init__(self, port, source="127.0.0.1", host="127.0.0.1"):
         from pymodbus.client import ModbusTcpClient
@@ -64,11 +78,14 @@ class Plc:
                 letters = b"".join(r.to_bytes(2, "big") for r in said[1:])[: said[0]]
                 return Job(self.client, registers, letters.decode("ascii"))
 
+    def made(self):
+        return Made(self.read(255, 107))
+
     def write(self, address, values):
         return self.client.write_registers(address, values)
 
     def recipe(self, name, sweep_mm=0):
-        padded = name.encode().ljust(40, b"\0")
+        padded = name.encode("latin-1").ljust(40, b"\0")
         words = [int.from_bytes(padded[i : i + 2], "big") for i in range(0, 40, 2)]
         sweep = self.client.convert_to_registers(round(sweep_mm * 1000), self.client.DATATYPE.INT32)
         assert not self.write(16, words + sweep).isError()

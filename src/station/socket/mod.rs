@@ -23,5 +23,5 @@ pub use peers::Traffic;
 pub use registers::has_registers;
 pub use serve::{Patience, serve};
 pub use session::{Session, SocketOptions};
-pub use shown::{JobShown, RobotShown, Shown, Stage};
+pub use shown::{JobShown, Made, RobotShown, Shown, Stage};
 pub use table::{GATES, request};

@@ -4,7 +4,7 @@
 
 use super::shown::{self, Shown};
 use super::table::{PER_DEGREE, PER_MM, POSE, TABLE, holding, input, request};
-use super::words::{self, Code, Of, Reply, Request, Which, Wrong};
+use super::words::{self, Code, Of, Reply, Request, Target, Which, Wrong};
 use crate::fault::{Fault, Result};
 use crate::robot::Convention;
 use std::net::IpAddr;
@@ -144,29 +144,35 @@ impl Registers {
     }
 
     fn request(&self) -> std::result::Result<Request, Wrong> {
-        let choice = |at: usize, what: &str, most: u16| match self.holding[at] {
-            x if x <= most => Ok(x),
-            x => Err(Wrong::new(Code::Word, format!("register {at} is {x}, 0 to {most} {what}"))),
+        let choice = |at: usize, what: &str, [least, most]: [u16; 2]| match self.holding[at] {
+            x if (least..=most).contains(&x) => Ok(usize::from(x - least)),
+            x => Err(Wrong::new(Code::Word, format!("register {at} is {x}, {least} to {most} {what}"))),
         };
         match self.holding[holding::WORD] {
-            request::SCAN => Ok(Request::Scan),
+            request::SCAN if self.jobs => words::recording(&self.name()).map(Request::Scan),
+            request::SCAN => Ok(Request::Scan(None)),
             request::POSE => Ok(Request::Pose(self.pose())),
-            request::FIND => words::recipe(&self.recipe()).map(Request::Find),
+            request::FIND => words::recipe(&self.name()).map(Request::Find),
             request::GIVE => {
                 let which = [Which::Approach, Which::Insertion, Which::Retract];
-                let which = which[usize::from(choice(holding::WHICH, "are approach, insertion, retract", 2)?)];
-                let of = [Of::Tool, Of::Flange][usize::from(choice(holding::OF, "are tool, flange", 1)?)];
+                let which = which[choice(holding::WHICH, "are approach, insertion, retract", [0, 2])?];
+                let of = [Of::Tool, Of::Flange][choice(holding::OF, "are tool, flange", [0, 1])?];
                 Ok(Request::Give(which, of))
             }
             request::INSERT if self.jobs => {
-                let recipe = words::recipe(&self.recipe())?;
+                let recipe = words::recipe(&self.name())?;
                 let sweep_mm = self.numbers(holding::SWEEP, 1).map(|n| f64::from(n) / PER_MM).next();
                 Ok(Request::Insert { recipe, sweep_mm: sweep_mm.filter(|mm| *mm != 0.0) })
             }
             request::STOP if self.jobs => Ok(Request::Stop),
+            request::CALIBRATE if self.jobs => {
+                let what = "are camera, hand-eye, laser plane, pointer, axis";
+                let target = Target::ALL[choice(holding::TARGET, what, [1, 5])?];
+                Ok(Request::Calibrate(target, words::recording(&self.name())?))
+            }
             x => {
                 let known = match self.jobs {
-                    true => "1 SCAN, 2 POSE, 3 FIND, 4 GIVE, 5 INSERT and 6 STOP",
+                    true => "1 SCAN, 2 POSE, 3 FIND, 4 GIVE, 5 INSERT, 6 STOP and 7 CALIBRATE",
                     false => "1 SCAN, 2 POSE, 3 FIND and 4 GIVE",
                 };
                 Err(Wrong::new(Code::Word, format!("register {} is {x}; {known} are requests", holding::WORD)))
@@ -188,8 +194,8 @@ impl Registers {
         self.numbers(holding::POSE, POSE / 2).zip(self.scales()).map(|(n, scale)| f64::from(n) / scale).collect()
     }
 
-    fn recipe(&self) -> String {
-        let words = &self.holding[holding::RECIPE..holding::SWEEP];
+    fn name(&self) -> String {
+        let words = &self.holding[holding::NAME..holding::SWEEP];
         let bytes = words.iter().flat_map(|w| w.to_be_bytes()).take_while(|b| *b != 0);
         bytes.map(char::from).collect::<String>().trim_end().to_owned()
     }
@@ -197,7 +203,7 @@ impl Registers {
     /// Puts what a request came to and the session's state into the registers, and ends the request.
     pub fn answer(&mut self, number: u16, said: &std::result::Result<Reply, Wrong>, state: &Reply) {
         self.input[input::ERROR] = said.as_ref().err().map_or(0, |w| w.code as u16);
-        let words = said.as_ref().err().map(words::plain).unwrap_or_default();
+        let words = said.as_ref().err().map(|wrong| words::plain(&wrong.words)).unwrap_or_default();
         shown::letters(&mut self.input, input::LENGTH, &words);
         self.state(state);
         match said {
@@ -384,10 +390,45 @@ mod tests {
         assert_eq!(insert(&mut r, 3, [65535, 65535]), of(Some(-0.001)), "the job refuses it");
         assert_eq!(r.read(4, 2), Ok(vec![0, 3]));
         assert_eq!(r.write(0, &[4, 6], PLC, now).unwrap().unwrap().request, Ok(Request::Stop));
-        assert_eq!(r.read(254, 1), Ok(vec![0]));
-        assert_eq!((r.read(255, 1), r.write(38, &[1], PLC, now)), (Err(Refused::Address), Err(Refused::Address)));
+        assert_eq!(r.read(361, 1), Ok(vec![0]));
+        assert_eq!((r.read(362, 1), r.write(38, &[1], PLC, now)), (Err(Refused::Address), Err(Refused::Address)));
         let said = plain.write(0, &[1, 5], PLC, now).unwrap().unwrap().request.unwrap_err();
         assert_eq!(said.words, "register 1 is 5; 1 SCAN, 2 POSE, 3 FIND and 4 GIVE are requests");
+    }
+
+    #[test]
+    fn scans_and_calibrations_name_a_recording_or_the_newest() {
+        let (mut r, mut plain, now) = (with_jobs(), registers(), Instant::now());
+        let ask = |r: &mut Registers, name: &[u16], values: [u16; 2]| {
+            let mut all = [0; 20];
+            all[..name.len()].copy_from_slice(name);
+            assert_eq!(r.write(16, &all, PLC, now), Ok(None));
+            let number = r.read(3, 1).unwrap()[0] + 1;
+            let asked = r.write(0, &[number, values[0], values[1]], PLC, now).unwrap().unwrap();
+            r.answer(number, &Ok(Reply::Ordered("0001-scan".into())), &Reply::Works);
+            asked.request
+        };
+        // "a/b 1"
+        let name = &[0x612f, 0x6220, 0x3100];
+        assert_eq!(ask(&mut r, name, [1, 0]), Ok(Request::Scan(Some("a/b 1".into()))));
+        assert_eq!(ask(&mut r, &[], [1, 0]), Ok(Request::Scan(None)));
+        assert_eq!(ask(&mut r, &[0x4141; 20], [1, 0]), Ok(Request::Scan(Some("A".repeat(40)))));
+        for (number, target) in (1..).zip(Target::ALL) {
+            assert_eq!((target as u16, ask(&mut r, &[], [7, number])), (number, Ok(Request::Calibrate(target, None))));
+        }
+        assert_eq!(ask(&mut r, name, [7, 2]), Ok(Request::Calibrate(Target::HandEye, Some("a/b 1".into()))));
+        let said = |request: std::result::Result<Request, Wrong>| request.unwrap_err().words;
+        for number in [0, 6] {
+            let what = format!("register 2 is {number}, 1 to 5 are camera, hand-eye, laser plane, pointer, axis");
+            assert_eq!(said(ask(&mut r, &[], [7, number])), what);
+        }
+        // Which letter a byte above 127 is, nobody has stated.
+        assert!(said(ask(&mut r, &[0x61fc], [1, 0])).contains("plain ASCII"));
+        assert!(said(ask(&mut r, &[0x0a61], [7, 1])).contains("plain ASCII"));
+        assert!(said(ask(&mut r, &[], [8, 0])).ends_with("6 STOP and 7 CALIBRATE are requests"));
+        // A robot's own program scans by its motions, whatever stands in the registers of names.
+        assert_eq!(ask(&mut plain, name, [1, 0]), Ok(Request::Scan(None)));
+        assert!(said(ask(&mut plain, name, [7, 1])).ends_with("3 FIND and 4 GIVE are requests"));
     }
 
     /// What is shown of a job is no answer to a request, and an answer changes nothing of the job.

@@ -106,11 +106,12 @@ impl Session {
         match request {
             Request::Hello => Ok(Reply::Hello),
             Request::Status => Ok(self.status()),
-            Request::Scan => self.begin(),
+            // A name is of a station that runs jobs; registers without jobs give none.
+            Request::Scan(_) => self.begin(),
             Request::Pose(numbers) => self.shot(&numbers),
             Request::Find(name) => self.find(&name),
             Request::Give(which, of) => self.give(which, of),
-            Request::Insert { .. } | Request::Stop => {
+            Request::Insert { .. } | Request::Stop | Request::Calibrate(..) => {
                 Err(Wrong::new(Code::Word, "here the robot's own program moves it: SCAN, POSE, FIND and GIVE"))
             }
             Request::Bye => Ok(Reply::Bye),

@@ -4,7 +4,8 @@
 
 use super::part::Part;
 use super::table::{GATES, OTHER_GATE, PER_SIGMA, POSE, WORDS, input, two};
-use super::words::{self, Wrong};
+use super::words::{self, Target, Wrong};
+use crate::rig::Verdict;
 use crate::station::job::Phase;
 
 /// The robot, as the screen knows it.
@@ -56,6 +57,23 @@ pub struct JobShown {
     pub error: Option<Wrong>,
     /// The part that it found, and its insertion pose in the notation of the registers.
     pub part: Option<(Part, Option<Vec<f64>>)>,
+    /// What it makes of a recording, of a scan or calibration.
+    pub made: Option<Made>,
+}
+
+/// A scan or a calibration from a recording, and what came of it; zeros and `None` before its end.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Made {
+    /// Path of the recording below the recordings' folder.
+    pub recording: String,
+    /// What is calibrated.
+    pub target: Option<Target>,
+    /// The calibration's verdict.
+    pub verdict: Option<Verdict>,
+    /// Shots of the scan.
+    pub shots: usize,
+    /// Its points.
+    pub points: u64,
 }
 
 /// All that the registers show of a station.
@@ -85,6 +103,16 @@ fn number(phase: Phase) -> u16 {
     }
 }
 
+/// Number of a verdict.
+fn verdict(verdict: Verdict) -> u16 {
+    match verdict {
+        Verdict::Good => 1,
+        Verdict::Usable => 2,
+        Verdict::BadlyDetermined => 3,
+        Verdict::Refused => 4,
+    }
+}
+
 /// Bits of the gates that were judged, and of those that passed.
 fn bits(gates: &[(String, bool)]) -> [u32; 2] {
     let bit = |name: &str| 1 << GATES.iter().position(|g| *g == name).map_or(OTHER_GATE, |k| k as u32);
@@ -110,7 +138,10 @@ impl Shown {
         to[input::PROCEDURE] = job.procedure;
         if let Some(wrong) = &job.error {
             to[input::JOB_ERROR] = wrong.code as u16;
-            letters(to, input::JOB_LENGTH, &words::plain(wrong));
+            letters(to, input::JOB_LENGTH, &words::plain(&wrong.words));
+        }
+        if let Some(made) = &job.made {
+            made.put(to);
         }
         let Some((part, pose)) = &job.part else { return };
         to[input::FOUND] = if pose.is_some() { 1 } else { 2 };
@@ -125,6 +156,18 @@ impl Shown {
             // What is greater, or not known, is the greatest number.
             *to = if sigma.is_nan() { u16::MAX } else { (sigma * PER_SIGMA).round() as u16 };
         }
+    }
+}
+
+impl Made {
+    fn put(&self, to: &mut [u16]) {
+        // More than the registers hold is the greatest number.
+        let counted = |n: u64| two(n.try_into().unwrap_or(u32::MAX));
+        to[input::TARGET] = self.target.map_or(0, |target| target as u16);
+        to[input::VERDICT] = self.verdict.map_or(0, verdict);
+        to[input::SCANNED..input::SCANNED + 2].copy_from_slice(&counted(self.shots as u64));
+        to[input::POINTS..input::POINTS + 2].copy_from_slice(&counted(self.points));
+        letters(to, input::RECORDING_LENGTH, &words::plain(&self.recording));
     }
 }
 
@@ -181,6 +224,7 @@ mod tests {
             asks: Some(Phase::Insert),
             error: Some(Wrong::new(Code::Full, "no room")),
             part: Some((part, Some(vec![300.0, -20.0, 420.0, 180.0, -0.0001, 90.0]))),
+            made: None,
         };
         let robot = RobotShown { linked: true, armed: true, attended: false, moves: true, look: true };
         Shown { robot, job: Some(job), ended: 3, inserted: 2 }.put(&mut to, units());
@@ -192,5 +236,39 @@ mod tests {
         assert_eq!(to[7], 913);
         Shown::default().put(&mut to, units());
         assert!(to.iter().all(|x| *x == 0), "{to:?}");
+    }
+
+    #[test]
+    fn what_a_job_makes_of_a_recording_stands_behind_the_rest() {
+        let shown = |made: Made, procedure: u16| {
+            let mut to = vec![0; input::COUNT_WITH_JOBS];
+            let job = JobShown {
+                number: 3,
+                procedure,
+                stage: Stage::Done,
+                phase: None,
+                asks: None,
+                error: None,
+                part: None,
+                made: Some(made),
+            };
+            Shown { job: Some(job), ..Shown::default() }.put(&mut to, std::iter::empty());
+            assert_eq!(to[121..129], [0, 3, 0, 0, 0, 3, procedure, 0]);
+            assert!(to[129..255].iter().all(|x| *x == 0), "{to:?}");
+            to[255..].to_vec()
+        };
+        let scan = Made { recording: "a/b\u{fc}".into(), shots: 70, points: 70_001, ..Made::default() };
+        let to = shown(scan, 1);
+        assert_eq!(to[..9], [0, 0, 0, 70, 1, 4465, 4, 0x612f, 0x623f]);
+        let of = |target, verdict| {
+            let made = Made { target: Some(target), verdict, points: 1 << 40, ..Made::default() };
+            shown(made, 7)[..6].to_vec()
+        };
+        assert_eq!(of(Target::LaserPlane, Some(Verdict::BadlyDetermined)), [3, 3, 0, 0, u16::MAX, u16::MAX]);
+        let numbers = [Verdict::Good, Verdict::Usable, Verdict::BadlyDetermined, Verdict::Refused]
+            .map(|v| of(Target::Axis, Some(v))[1]);
+        assert_eq!((numbers, of(Target::Axis, None)[..2].to_vec()), ([1, 2, 3, 4], vec![5, 0]));
+        let long = shown(Made { recording: "x".repeat(300), ..Made::default() }, 1);
+        assert_eq!((long[6], long.len(), long[106]), (200, 107, 0x7878));
     }
 }

@@ -17,9 +17,12 @@ pub mod holding {
     pub const NUMBER: usize = 0;
     pub const WORD: usize = 1;
     pub const WHICH: usize = 2;
+    /// Of a calibration.
+    pub const TARGET: usize = 2;
     pub const OF: usize = 3;
     pub const POSE: usize = 4;
-    pub const RECIPE: usize = 16;
+    /// The name of a recipe or recording.
+    pub const NAME: usize = 16;
     pub const SWEEP: usize = 36;
     /// Without jobs the table ends before the sweep.
     pub const COUNT: usize = 36;
@@ -56,7 +59,14 @@ pub mod input {
     pub const INSERTION: usize = 136;
     pub const SIGMA: usize = 148;
     pub const JOB_LENGTH: usize = 154;
-    pub const COUNT_WITH_JOBS: usize = 255;
+    // Behind what the first programs of stations had: who reads only that reads the same as before.
+    pub const TARGET: usize = 255;
+    pub const VERDICT: usize = 256;
+    pub const SCANNED: usize = 257;
+    pub const POINTS: usize = 259;
+    /// Number of characters; the registers of the recording's name follow it.
+    pub const RECORDING_LENGTH: usize = 261;
+    pub const COUNT_WITH_JOBS: usize = 362;
 }
 
 /// Registers of words: 200 characters.
@@ -64,7 +74,7 @@ pub const WORDS: usize = 100;
 
 /// Numbers of the requests.
 pub mod request {
-    /// Begins a scan.
+    /// Begins a scan, or orders one of a recording.
     pub const SCAN: u16 = 1;
     /// Takes a picture.
     pub const POSE: u16 = 2;
@@ -76,6 +86,8 @@ pub mod request {
     pub const INSERT: u16 = 5;
     /// Stops what the station does.
     pub const STOP: u16 = 6;
+    /// Orders a calibration.
+    pub const CALIBRATE: u16 = 7;
 }
 
 /// The gates of a found part by their bit.

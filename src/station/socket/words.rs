@@ -15,8 +15,9 @@ pub enum Request {
     Hello,
     /// Asks for the state of the session.
     Status,
-    /// Begins a scan; an earlier result is discarded.
-    Scan,
+    /// Begins a scan; an earlier result is discarded. Of a station that runs jobs: scans the recording of this name,
+    /// or the newest one.
+    Scan(Option<String>),
     /// The flange stands at this pose and the line is on: take the picture.
     Pose(Vec<f64>),
     /// The scan is complete: find the part of that recipe.
@@ -32,6 +33,8 @@ pub enum Request {
     },
     /// Stops what the station does; only over registers.
     Stop,
+    /// Orders a calibration from a recording, or from the newest one; only over registers of a station that runs jobs.
+    Calibrate(Target, Option<String>),
     /// Ends the connection.
     Bye,
 }
@@ -81,6 +84,26 @@ pub enum Of {
     Tool,
     /// The flange: tool 0.
     Flange,
+}
+
+/// Target of a calibration, with its number in the registers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// Camera and lens.
+    Camera = 1,
+    /// Pose of the camera on the flange.
+    HandEye = 2,
+    /// The laser plane.
+    LaserPlane = 3,
+    /// The pointer's beam.
+    Pointer = 4,
+    /// A linear axis or turntable.
+    Axis = 5,
+}
+
+impl Target {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [Target; 5] = [Target::Camera, Target::HandEye, Target::LaserPlane, Target::Pointer, Target::Axis];
 }
 
 /// Why a request is not executed; the answer contains the number.
@@ -150,7 +173,7 @@ pub fn read(line: &str) -> Result<Request, Wrong> {
     match word.to_ascii_uppercase().as_str() {
         "HELLO" => alone(Request::Hello),
         "STATUS" => alone(Request::Status),
-        "SCAN" => alone(Request::Scan),
+        "SCAN" => alone(Request::Scan(None)),
         "BYE" => alone(Request::Bye),
         "POSE" => numbers(rest).map(Request::Pose),
         "FIND" => recipe(rest).map(Request::Find),
@@ -186,6 +209,18 @@ pub fn recipe(name: &str) -> Result<String, Wrong> {
         Code::Word,
         format!("'{}' is not a recipe's name: 1 to 40 letters, digits, - and _ are", shown(name)),
     ))
+}
+
+/// A recording's path in registers; none if it is empty. What such a path may be is decided where the folder is known.
+///
+/// # Errors
+/// Characters whose encoding registers do not state.
+pub fn recording(name: &str) -> Result<Option<String>, Wrong> {
+    if !name.chars().all(|c| c.is_ascii_graphic() || c == ' ') {
+        let what = format!("'{}' is not a recording's name in registers: plain ASCII characters are", shown(name));
+        return Err(Wrong::new(Code::Word, what));
+    }
+    Ok((!name.is_empty()).then(|| name.to_owned()))
 }
 
 fn give(rest: &str) -> Result<Request, Wrong> {
@@ -234,13 +269,13 @@ pub fn yes(reply: &Reply, notation: Convention) -> String {
 
 /// A negative answer: one line of plain characters.
 pub fn no(wrong: &Wrong) -> String {
-    format!("ERROR {} {}", wrong.code as u8, plain(wrong)).trim_end().to_owned()
+    format!("ERROR {} {}", wrong.code as u8, plain(&wrong.words)).trim_end().to_owned()
 }
 
-/// The words of an error in plain characters, as many as a controller's string holds.
-pub fn plain(wrong: &Wrong) -> String {
+/// Words in plain characters, as many as a controller's string holds.
+pub fn plain(words: &str) -> String {
     let plain = |c: char| if c.is_ascii_graphic() || c == ' ' { c } else { '?' };
-    wrong.words.chars().map(plain).take(MOST_WORDS).collect()
+    words.chars().map(plain).take(MOST_WORDS).collect()
 }
 
 /// A pose's numbers: to 0.1 um, 1e-5 degrees, 1e-7 rad, 1e-6 of a quaternion or matrix.

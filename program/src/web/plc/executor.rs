@@ -2,16 +2,17 @@
 //! what the registers show.
 //! Frame and unit: poses in a notation; s.
 
-use super::job::{Stored, has_ended, procedure, shown, stored};
-use crate::web::message::{FindOrder, InsertOrder, Job, JobState, Order};
+use super::job::{Stored, has_ended, is_of_parts, procedure, shown, stored};
+use super::recording::{of_laser, of_target, taken, target};
+use crate::web::message::{CalibrateOrder, FindOrder, InsertOrder, Job, JobState, Order, ScanOrder};
 use crate::web::screen::{JOBS, Screen};
-use crate::web::work::recipe_named;
+use crate::web::work::{Place, recipe_named};
 use sheetlight::fault::{Fault, Kind};
 use sheetlight::robot::Convention;
 use sheetlight::station::Settings;
-use sheetlight::station::socket::words::{Code, Of, Reply, Request, Which, Wrong};
+use sheetlight::station::socket::words::{Code, Of, Reply, Request, Target, Which, Wrong};
 use sheetlight::station::socket::{Executor, RobotShown, Shown, Traffic};
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -40,6 +41,15 @@ pub(super) struct Plc {
     ordered: VecDeque<Instant>,
 }
 
+/// A fault in what a request names: no name, or nothing has it.
+fn named(fault: &Fault) -> Wrong {
+    match fault.kind {
+        Kind::Usage => Wrong::new(Code::Word, fault.what.clone()),
+        Kind::Input => Wrong::new(Code::Refused, fault.what.clone()),
+        _ => ours(fault),
+    }
+}
+
 /// A fault of ours as an answer.
 fn ours(fault: &Fault) -> Wrong {
     let code = match fault.kind {
@@ -52,7 +62,7 @@ fn ours(fault: &Fault) -> Wrong {
 }
 
 impl Plc {
-    /// Shows the last job that found or inserted something.
+    /// Shows the last job of the kinds that registers order.
     pub fn new(screen: Arc<Screen>, notation: Convention) -> Plc {
         let job = screen.jobs.list(JOBS).into_iter().find(|job| procedure(&job.order).is_some());
         Plc {
@@ -78,12 +88,14 @@ impl Plc {
         (self.job, self.counted, self.read, self.stored) = (Some(id), false, None, Stored::default());
     }
 
-    /// Shows the job that runs, counts it when it has ended, and reads what it has stored.
+    /// Shows the job that runs, counts it when it has ended, and reads what it has stored. A scan or calibration of the
+    /// screen does not take the place of a part that a PLC may still ask for.
     fn follow(&mut self) -> Option<Job> {
         let jobs = &self.screen.jobs;
-        let running = jobs.running().and_then(|id| jobs.get(&id).ok()).filter(|job| procedure(&job.order).is_some());
+        let running = jobs.running().and_then(|id| jobs.get(&id).ok());
+        let is_shown = |job: &Job| self.job.as_ref() == Some(&job.id);
         if let Some(job) = running
-            && (self.counted || self.job.as_ref() != Some(&job.id))
+            && if is_shown(&job) { self.counted } else { is_of_parts(&job.order) }
         {
             self.take(job.id);
         }
@@ -131,16 +143,12 @@ impl Plc {
         Ok(())
     }
 
-    /// Orders a job, if the screen would take it now and no other one runs or waits.
-    fn order(&mut self, recipe: &str, order: Order) -> Result<Reply, Wrong> {
+    /// Orders the job that `make` makes, if the screen would take it now and no other one runs or waits.
+    fn order(&mut self, moves: bool, make: impl FnOnce(&Place) -> Result<Order, Fault>) -> Result<Reply, Wrong> {
         if let Some(busy) = self.screen.jobs.busy() {
             return Err(Wrong::new(Code::Busy, format!("{busy} runs or waits")));
         }
-        self.attended(matches!(order, Order::Insert(_)))?;
-        recipe_named(&self.screen.place, recipe).map_err(|fault| match fault.kind {
-            Kind::Input | Kind::Usage => Wrong::new(Code::Refused, fault.what),
-            _ => ours(&fault),
-        })?;
+        self.attended(moves)?;
         while self.ordered.front().is_some_and(|at| at.elapsed() > A_MINUTE) {
             self.ordered.pop_front();
         }
@@ -148,6 +156,7 @@ impl Plc {
             let what = format!("{MOST_JOBS} jobs were ordered in the last minute, no more are taken");
             return Err(Wrong::new(Code::Busy, what));
         }
+        let order = make(&self.screen.place).map_err(|fault| named(&fault))?;
         // What ended since the last look is counted before another job takes its place.
         self.follow();
         let job = self.screen.jobs.order_alone(order).map_err(|fault| match fault.kind {
@@ -163,8 +172,37 @@ impl Plc {
     fn find(&mut self, recipe: String) -> Result<Reply, Wrong> {
         let scanned = |job: &Job| matches!((&job.order, job.state), (Order::Scan(_), JobState::Done));
         let scan = self.screen.jobs.list(JOBS).into_iter().find(scanned);
-        let scan = scan.ok_or_else(|| Wrong::new(Code::Order, "no scan is finished: scan on the screen first"))?;
-        self.order(&recipe.clone(), Order::Find(FindOrder { scans: vec![scan.id], recipe, pins: None }))
+        let scan =
+            scan.ok_or_else(|| Wrong::new(Code::Order, "no scan is finished: SCAN first, or scan on the screen"))?;
+        self.order(false, |place| {
+            recipe_named(place, &recipe)?;
+            Ok(Order::Find(FindOrder { scans: vec![scan.id], recipe, pins: None }))
+        })
+    }
+
+    fn insert(&mut self, recipe: String, sweep_mm: Option<f64>) -> Result<Reply, Wrong> {
+        self.order(true, |place| {
+            recipe_named(place, &recipe)?;
+            Ok(Order::Insert(InsertOrder { recipe, sweep_mm, speed_mm_s: None, back_out: false }))
+        })
+    }
+
+    /// Scans a recording with the station's settings.
+    fn scan(&mut self, recording: Option<String>) -> Result<Reply, Wrong> {
+        self.order(false, |place| {
+            let recording = taken(place, recording, of_laser, "the laser line")?;
+            let settings = BTreeMap::new();
+            Ok(Order::Scan(ScanOrder { recording, cell_mm: None, on: None, skip_bad: false, settings }))
+        })
+    }
+
+    /// Calibrates from a recording. A person accepts the result at the screen, or not.
+    fn calibrate(&mut self, of: Target, recording: Option<String>) -> Result<Reply, Wrong> {
+        self.order(false, |place| {
+            let target = target(of);
+            let recording = taken(place, recording, |r| of_target(r, target), "boards that suits this calibration")?;
+            Ok(Order::Calibrate(CalibrateOrder { target, recording, leave_out: vec![] }))
+        })
     }
 
     fn give(&mut self, which: Which, of: Of) -> Result<Reply, Wrong> {
@@ -191,10 +229,9 @@ impl Executor for Plc {
 
     fn done(&mut self, request: Request) -> Result<Reply, Wrong> {
         match request {
-            Request::Insert { recipe, sweep_mm } => {
-                let order = InsertOrder { recipe: recipe.clone(), sweep_mm, speed_mm_s: None, back_out: false };
-                self.order(&recipe, Order::Insert(order))
-            }
+            Request::Insert { recipe, sweep_mm } => self.insert(recipe, sweep_mm),
+            Request::Scan(recording) => self.scan(recording),
+            Request::Calibrate(target, recording) => self.calibrate(target, recording),
             Request::Find(recipe) => self.find(recipe),
             Request::Give(which, of) => self.give(which, of),
             // As every viewer may.
@@ -203,7 +240,7 @@ impl Executor for Plc {
                 self.screen.jobs.keep(&stopped);
                 Ok(Reply::Stopped)
             }
-            Request::Scan | Request::Pose(_) => {
+            Request::Pose(_) => {
                 Err(Wrong::new(Code::Order, "here the station moves the robot: INSERT scans, finds and inserts"))
             }
             Request::Hello | Request::Status | Request::Bye => {

@@ -1,12 +1,14 @@
 //! In: a job of the screen, as it is stored and as it runs. Out: what the registers show of it.
 //! Frame and unit: poses in a notation; s since 1970.
 
-use crate::web::message::{Job, JobState, MotionState, Order, Outcome};
+use super::recording::target_shown;
+use crate::web::message::{CalibrationFigures, Job, JobState, MotionState, Order, Outcome};
 use crate::web::work::{Jobs, insertion_of, report_of};
+use sheetlight::rig::Verdict;
 use sheetlight::robot::Convention;
 use sheetlight::station::job::{JobState as Insertion, Phase};
 use sheetlight::station::socket::words::{Code, Of, Which, Wrong};
-use sheetlight::station::socket::{JobShown, Part, Stage, request};
+use sheetlight::station::socket::{JobShown, Made, Part, Stage, request};
 use std::path::Path;
 use std::time::UNIX_EPOCH;
 
@@ -23,8 +25,15 @@ pub(super) fn procedure(order: &Order) -> Option<u16> {
     match order {
         Order::Find(_) => Some(request::FIND),
         Order::Insert(_) => Some(request::INSERT),
+        Order::Scan(_) => Some(request::SCAN),
+        Order::Calibrate(_) => Some(request::CALIBRATE),
         _ => None,
     }
+}
+
+/// Whether such a job finds or inserts a part.
+pub(super) fn is_of_parts(order: &Order) -> bool {
+    matches!(order, Order::Find(_) | Order::Insert(_))
 }
 
 /// Whether the job neither waits nor runs.
@@ -79,7 +88,31 @@ pub(super) fn shown(job: &Job, stored: &Stored, motion: &MotionState, notation: 
             let pose = pose(&part);
             (part, pose)
         }),
+        made: made(job),
     })
+}
+
+/// What a scan or calibration makes of its recording.
+fn made(job: &Job) -> Option<Made> {
+    let mut made = match &job.order {
+        Order::Scan(ask) => Made { recording: ask.recording.clone(), ..Made::default() },
+        Order::Calibrate(ask) => {
+            Made { recording: ask.recording.clone(), target: target_shown(ask.target), ..Made::default() }
+        }
+        _ => return None,
+    };
+    match &job.outcome {
+        Some(Outcome::Scan(scan)) => (made.shots, made.points) = (scan.shots, scan.points),
+        Some(Outcome::Calibrate(figures)) => made.verdict = verdict(figures),
+        _ => {}
+    }
+    Some(made)
+}
+
+/// The verdict by its words.
+fn verdict(figures: &CalibrationFigures) -> Option<Verdict> {
+    use Verdict::{BadlyDetermined, Good, Refused, Usable};
+    [Good, Usable, BadlyDetermined, Refused].into_iter().find(|verdict| verdict.words() == figures.verdict)
 }
 
 /// The phase of a step, by the name that is shown to a person.
@@ -99,11 +132,7 @@ fn error(job: &Job) -> Option<Wrong> {
     let words = job.problem.as_ref().map_or("", |problem| problem.what.as_str());
     let code = match job.state {
         JobState::Queued | JobState::Running => return None,
-        JobState::Done => {
-            let Some(Outcome::Find(found)) = &job.outcome else { return None };
-            let missed = found.poses.is_none();
-            return missed.then(|| Wrong::new(Code::Refused, format!("no pose: {}", found.reasons.join("; "))));
-        }
+        JobState::Done => return short_of(job.outcome.as_ref()?),
         JobState::Stopped => Code::Stopped,
         JobState::CutOff => return Some(Wrong::new(Code::CutOff, "the program ended while the job ran")),
         JobState::Failed => match job.problem.as_ref().map_or("", |problem| problem.kind.as_str()) {
@@ -116,10 +145,22 @@ fn error(job: &Job) -> Option<Wrong> {
     Some(Wrong::new(code, words))
 }
 
+/// What a result lacks that the next step needs: a pose to insert at, a calibration that may be accepted.
+fn short_of(outcome: &Outcome) -> Option<Wrong> {
+    let what = match outcome {
+        Outcome::Find(found) if found.poses.is_none() => format!("no pose: {}", found.reasons.join("; ")),
+        Outcome::Calibrate(figures) if verdict(figures) >= Some(Verdict::BadlyDetermined) => {
+            format!("the calibration is {}: {}", figures.verdict, figures.reasons.join("; "))
+        }
+        _ => return None,
+    };
+    Some(Wrong::new(Code::Refused, what))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::web::message::{InsertOrder, Problem};
+    use crate::web::message::{CalibrateOrder, InsertOrder, Problem, ScanFigures, ScanOrder, Target};
     use sheetlight::fault::Fault;
 
     fn job(state: JobState, fault: Option<Fault>) -> Job {
@@ -171,5 +212,72 @@ mod tests {
             super::shown(&job, &Stored::default(), &MotionState::default(), Convention::Denso).map(|s| s.number)
         };
         assert_eq!([shown("0012-insert"), shown("x"), shown("99999999999-insert")], [Some(12), None, None]);
+    }
+
+    fn shown_of(job: &Job) -> JobShown {
+        shown(job, &Stored::default(), &MotionState::default(), Convention::Denso).unwrap()
+    }
+
+    #[test]
+    fn a_scan_shows_its_recording_and_at_its_end_its_numbers() {
+        let settings = Default::default();
+        let order = ScanOrder { recording: "a/b".into(), cell_mm: None, on: None, skip_bad: false, settings };
+        let runs = Job { id: "0013-scan".into(), order: Order::Scan(order), ..job(JobState::Running, None) };
+        let of_it = Made { recording: "a/b".into(), ..Made::default() };
+        assert_eq!((shown_of(&runs).procedure, shown_of(&runs).made), (1, Some(of_it.clone())));
+        let figures = ScanFigures {
+            shots: 70,
+            points: 70_001,
+            width: 1,
+            height: 1,
+            frame: "base".into(),
+            median_sigma_mm: None,
+            coverage: None,
+            cell_mm: None,
+            z_mm: None,
+            peaks: Default::default(),
+            dark_shots: 0,
+            skipped: vec![],
+            seconds: 1.0,
+            shots_per_second: 1.0,
+            ran_on: String::new(),
+            spent: Default::default(),
+            remarks: vec![],
+        };
+        let done = Job { state: JobState::Done, outcome: Some(Outcome::Scan(Box::new(figures))), ..runs };
+        let shown = shown_of(&done);
+        assert_eq!((shown.made, shown.error), (Some(Made { shots: 70, points: 70_001, ..of_it }), None));
+    }
+
+    #[test]
+    fn a_calibration_shows_its_verdict_and_what_nobody_may_accept_is_an_error() {
+        let of = |verdict: Option<Verdict>| {
+            let ask = CalibrateOrder { target: Target::HandEye, recording: "a".into(), leave_out: vec![] };
+            let figures = |verdict: Verdict| CalibrationFigures {
+                kind: "hand_eye".into(),
+                verdict: verdict.words().into(),
+                reasons: vec!["few poses".into(), "small turns".into()],
+                advice: vec![],
+                figures: Default::default(),
+                former: Default::default(),
+                per_picture: vec![],
+                left_out: vec![],
+                accepted: false,
+            };
+            let outcome = verdict.map(|v| Outcome::Calibrate(Box::new(figures(v))));
+            let state = if verdict.is_some() { JobState::Done } else { JobState::Running };
+            let shown = shown_of(&Job { order: Order::Calibrate(ask), outcome, ..job(state, None) });
+            let made = shown.made.unwrap();
+            assert_eq!((shown.procedure, made.target), (7, target_shown(Target::HandEye)));
+            (made.verdict, shown.error.map(|e| (e.code, e.words)))
+        };
+        assert_eq!(of(None), (None, None));
+        for good in [Verdict::Good, Verdict::Usable] {
+            assert_eq!(of(Some(good)), (Some(good), None));
+        }
+        for bad in [Verdict::BadlyDetermined, Verdict::Refused] {
+            let words = format!("the calibration is {}: few poses; small turns", bad.words());
+            assert_eq!(of(Some(bad)), (Some(bad), Some((Code::Refused, words))));
+        }
     }
 }
