@@ -49,13 +49,12 @@ pub fn words(arguments: &[Variant], at: usize) -> Result<Vec<String>, StatusCode
     values.into_iter().map(word).collect()
 }
 
-/// Options of a job: the texts "insert", "find" and "sweep_mm=30".
+/// Options of a job: the texts "insert", "find", "scan" and "sweep_mm=30".
 pub fn request(recipe: &str, parameters: &[String]) -> Result<Ask, StatusCode> {
-    let (mut find, mut sweep_mm) = (false, None);
-    for word in parameters {
-        match word.split_once('=') {
-            None if word == "insert" => find = false,
-            None if word == "find" => find = true,
+    let (mut word, mut sweep_mm) = ("insert", None);
+    for text in parameters {
+        match text.split_once('=') {
+            None if ["insert", "find", "scan"].contains(&text.as_str()) => word = text,
             Some(("sweep_mm", mm)) => {
                 let mm: f64 = mm.parse().map_err(|_| StatusCode::BadInvalidArgument)?;
                 if !mm.is_finite() {
@@ -66,7 +65,11 @@ pub fn request(recipe: &str, parameters: &[String]) -> Result<Ask, StatusCode> {
             _ => return Err(StatusCode::BadInvalidArgument),
         }
     }
-    Ok(if find { Ask::Find(recipe.into()) } else { Ask::Insert(recipe.into(), sweep_mm) })
+    Ok(match word {
+        "find" => Ask::Find(recipe.into()),
+        "scan" => Ask::Scan(None),
+        _ => Ask::Insert(recipe.into(), sweep_mm),
+    })
 }
 
 /// The name in one of both identifiers of a recipe; the internal one counts first [opc-mv, 7.5.2.2].
@@ -105,6 +108,7 @@ mod tests {
         assert_eq!(of(&[]), Ok(Ask::Insert("led".into(), None)));
         assert_eq!(of(&["sweep_mm=30.5", "insert"]), Ok(Ask::Insert("led".into(), Some(30.5))));
         assert_eq!(of(&["find"]), Ok(Ask::Find("led".into())));
+        assert_eq!(of(&["scan"]), Ok(Ask::Scan(None)));
         for bad in ["dance", "sweep_mm=", "sweep_mm=inf", "=", ""] {
             assert_eq!(of(&[bad]), Err(StatusCode::BadInvalidArgument), "{bad}");
         }

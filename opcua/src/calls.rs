@@ -129,7 +129,7 @@ impl Vision {
                 return no(self.refuses((error::NOT_PREPARED, what)));
             }
             let guided = inner.seen.as_ref().is_some_and(|seen| !seen.jobs);
-            let ask = if guided { Ask::Scan } else { request(&prepared, &parameters)? };
+            let ask = if guided { Ask::Scan(None) } else { request(&prepared, &parameters)? };
             inner.starting = true;
             (ask, prepared, guided)
         };

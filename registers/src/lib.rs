@@ -7,4 +7,4 @@ mod station;
 mod table;
 
 pub use station::{Station, Unanswered};
-pub use table::{Answer, Ask, Job, Robot, Seen, Stage, is_address, is_name};
+pub use table::{Answer, Ask, Job, Robot, Seen, Stage, Target, Verdict, is_address, is_name, is_recording};

@@ -3,13 +3,13 @@
 //! Frame and unit: s.
 
 use crate::modbus::{Trouble, Wire};
-use crate::table::{self, ANSWERS, Answer, Ask, JOBS, Seen, TABLE, WORDS};
+use crate::table::{self, ANSWERS, Answer, Ask, JOBS, MADE, Seen, TABLE, WORDS};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::thread::Builder;
 use std::time::{Duration, Instant};
 use tokio::sync::oneshot;
 
-/// Three reads each time: a third of what a station answers without delay.
+/// Five reads each time at most: half of what a station answers without delay.
 const LOOK: Duration = Duration::from_millis(50);
 /// Pause before a lost station is tried again.
 const AGAIN: Duration = Duration::from_secs(1);
@@ -33,7 +33,7 @@ pub enum Unanswered {
     Lost(String),
     /// Another machine makes the requests, or too many wait.
     Busy(String),
-    /// The station refuses registers that it should have.
+    /// The station refuses registers that it should have, or has not those of this request.
     Refused(String),
 }
 
@@ -90,6 +90,8 @@ struct Talk {
     wire: Wire,
     /// The station runs jobs.
     jobs: bool,
+    /// It has the registers of scans and calibrations.
+    makes: bool,
 }
 
 impl Talk {
@@ -103,12 +105,13 @@ impl Talk {
         if table != TABLE {
             return Err(format!("its registers are of table {table}, this program knows table {TABLE}"));
         }
-        let jobs = match wire.read(JOBS) {
-            Ok(_) => true,
-            Err(Trouble::Exception(NO_SUCH)) => false,
-            Err(trouble) => return Err(words(trouble)),
+        let mut has = |registers| match wire.read(registers) {
+            Ok(_) => Ok(true),
+            Err(Trouble::Exception(NO_SUCH)) => Ok(false),
+            Err(trouble) => Err(words(trouble)),
         };
-        Ok(Talk { wire, jobs })
+        let (jobs, makes) = (has(JOBS)?, has(MADE)?);
+        Ok(Talk { wire, jobs, makes })
     }
 
     /// What the station shows; the registers of answers beside it.
@@ -122,12 +125,14 @@ impl Talk {
         if !self.jobs {
             return Ok((Seen::default(), answers));
         }
-        // The words are those of the error only if the job is the same before and after them.
+        // What is read beside the job is of that job only if it is the same before and after.
         loop {
             let jobs = read(&mut self.wire, JOBS)?;
             let words = if jobs[7] == 0 { vec![] } else { read(&mut self.wire, WORDS)? };
-            if jobs[7] == 0 || read(&mut self.wire, JOBS)?[4..8] == jobs[4..8] {
-                return Ok((table::seen(&answers, &jobs, &words), answers));
+            let made = if self.makes && table::makes(&jobs) { read(&mut self.wire, MADE)? } else { vec![] };
+            let alone = words.is_empty() && made.is_empty();
+            if alone || read(&mut self.wire, JOBS)?[4..8] == jobs[4..8] {
+                return Ok((table::seen(&answers, &jobs, &words, &made), answers));
             }
         }
     }
@@ -138,6 +143,10 @@ impl Talk {
         ask: &Ask,
         told: &mut impl FnMut(Result<Seen, String>),
     ) -> Result<Result<Answer, Unanswered>, String> {
+        if self.jobs && !self.makes && ask.makes() {
+            let what = "the program of this station is older: it has no registers for scans and calibrations";
+            return Ok(Err(Unanswered::Refused(what.into())));
+        }
         let begun = Instant::now();
         let (_, before) = self.look()?;
         let number = before[3].checked_add(1).unwrap_or(1);
@@ -223,13 +232,15 @@ fn follows(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::table::Target;
     use std::io::{Read, Write};
     use std::net::{TcpListener, TcpStream};
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering::SeqCst};
 
-    /// Answers reads as a station without jobs does; counts a request and drops the connection instead of answering it.
-    fn serves(mut stream: TcpStream, requests: &AtomicUsize) -> std::io::Result<()> {
+    /// Answers reads as a station does that has `count` registers; counts a request and drops the connection instead of
+    /// answering it.
+    fn serves(mut stream: TcpStream, requests: &AtomicUsize, count: u16) -> std::io::Result<()> {
         loop {
             let mut head = [0; 8];
             stream.read_exact(&mut head)?;
@@ -239,14 +250,15 @@ mod tests {
                 requests.fetch_add(1, SeqCst);
                 return Ok(());
             }
-            let (at, count) = (rest[1], rest[3]);
-            let pdu = match at {
-                0 => {
-                    let mut registers = vec![0; 2 * usize::from(count)];
+            let [at, asked] = [0, 2].map(|k| u16::from_be_bytes([rest[k], rest[k + 1]]));
+            let pdu = if at + asked > count {
+                vec![0x84, NO_SUCH]
+            } else {
+                let mut registers = vec![0; 2 * usize::from(asked)];
+                if at == 0 {
                     registers[1] = TABLE as u8;
-                    [vec![4, 2 * count], registers].concat()
                 }
-                _ => vec![0x84, NO_SUCH],
+                [vec![4, 2 * asked as u8], registers].concat()
             };
             stream.write_all(&[&head[..4], &[0, pdu.len() as u8 + 1, head[6]], &pdu].concat())?;
         }
@@ -262,7 +274,7 @@ mod tests {
             for stream in listener.incoming() {
                 counts.1.fetch_add(1, SeqCst);
                 // The client ends the connection.
-                let _ = serves(stream.unwrap(), &counts.0);
+                let _ = serves(stream.unwrap(), &counts.0, 121);
             }
         });
         let (tell, mut told) = tokio::sync::mpsc::unbounded_channel();
@@ -271,11 +283,36 @@ mod tests {
         };
         let station = Station::begin(address, tells).unwrap();
         assert_eq!(told.recv().await, Some(true));
-        assert!(matches!(station.ask(Ask::Scan).await, Err(Unanswered::Lost(_))));
+        assert!(matches!(station.ask(Ask::Scan(None)).await, Err(Unanswered::Lost(_))));
         // Lost, and back.
         while told.recv().await == Some(true) {}
         while told.recv().await == Some(false) {}
         assert_eq!(told.recv().await, Some(true));
         assert_eq!((requests.load(SeqCst), connections.load(SeqCst)), (1, 2));
+    }
+
+    /// A station whose program is older is told nothing that it would take for something else: there SCAN was refused,
+    /// and registers behind the words of the error did not exist.
+    #[tokio::test]
+    async fn a_station_without_registers_for_scans_is_not_asked_for_one() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap().to_string();
+        let requests = Arc::new(AtomicUsize::new(0));
+        let counted = requests.clone();
+        std::thread::spawn(move || {
+            for stream in listener.incoming() {
+                let _ = serves(stream.unwrap(), &counted, 255);
+            }
+        });
+        let (tell, mut told) = tokio::sync::mpsc::unbounded_channel();
+        let station = Station::begin(address, move |seen| drop(tell.send(seen.map(|s| s.jobs)))).unwrap();
+        assert_eq!(told.recv().await, Some(Ok(true)));
+        for ask in [Ask::Scan(None), Ask::Calibrate(Target::Camera, Some("a".into()))] {
+            let Err(Unanswered::Refused(why)) = station.ask(ask).await else { panic!("it was asked") };
+            assert!(why.contains("is older"), "{why}");
+        }
+        assert_eq!(requests.load(SeqCst), 0);
+        assert!(matches!(station.ask(Ask::Stop).await, Err(Unanswered::Lost(_))));
+        assert_eq!(requests.load(SeqCst), 1);
     }
 }

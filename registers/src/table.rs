@@ -8,6 +8,11 @@ pub const TABLE: u16 = 1;
 pub const ANSWERS: (u16, u16) = (0, 121);
 pub const JOBS: (u16, u16) = (121, 33);
 pub const WORDS: (u16, u16) = (154, 101);
+/// What a scan or calibration made of its recording. The first programs of stations have none of these.
+pub const MADE: (u16, u16) = (255, 107);
+/// Requests whose jobs make something of a recording.
+const SCAN: u16 = 1;
+const CALIBRATE: u16 = 7;
 const PER_MM: f64 = 1000.0;
 const PER_DEGREE: f64 = 10_000.0;
 const PER_SIGMA: f64 = 10_000.0;
@@ -42,11 +47,73 @@ const GATES: [&str; 21] = [
 /// The phases of an insertion by their number; 0 has no name.
 const PHASES: [&str; 9] = ["", "touch", "scan", "find", "approach", "insert", "retract", "inserted", "backed out"];
 
+/// Target of a calibration, with its number in the registers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    Camera = 1,
+    HandEye = 2,
+    LaserPlane = 3,
+    Pointer = 4,
+    Axis = 5,
+}
+
+impl Target {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [Target; 5] = [Target::Camera, Target::HandEye, Target::LaserPlane, Target::Pointer, Target::Axis];
+
+    /// In letters, digits and _.
+    pub fn word(self) -> &'static str {
+        match self {
+            Target::Camera => "camera",
+            Target::HandEye => "hand_eye",
+            Target::LaserPlane => "laser_plane",
+            Target::Pointer => "pointer",
+            Target::Axis => "axis",
+        }
+    }
+}
+
+/// Verdict of a calibration, by its number in the registers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Verdict {
+    /// There is none yet, or this program does not know it.
+    #[default]
+    None,
+    Good,
+    Usable,
+    BadlyDetermined,
+    Refused,
+}
+
+impl Verdict {
+    fn of(number: u16) -> Verdict {
+        use Verdict::{BadlyDetermined, Good, Refused, Usable};
+        [Verdict::None, Good, Usable, BadlyDetermined, Refused].get(usize::from(number)).copied().unwrap_or_default()
+    }
+
+    /// Whether a person may accept such a calibration.
+    pub fn is_acceptable(self) -> bool {
+        matches!(self, Verdict::Good | Verdict::Usable)
+    }
+
+    /// As a word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Verdict::None => "none",
+            Verdict::Good => "good",
+            Verdict::Usable => "usable",
+            Verdict::BadlyDetermined => "badly determined",
+            Verdict::Refused => "refused",
+        }
+    }
+}
+
 /// What a station is asked.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ask {
-    /// Begin a scan by the client's own motions.
-    Scan,
+    /// Scan the recording of this name, or the newest one; where the client moves the robot, begin a scan by its own
+    /// motions.
+    Scan(Option<String>),
     /// The flange stands here: take a picture.
     Pose([f64; 6]),
     /// Find the part of a recipe.
@@ -57,6 +124,8 @@ pub enum Ask {
     Insert(String, Option<f64>),
     /// Stop what runs.
     Stop,
+    /// Calibrate from the recording of this name, or from the newest one. A person accepts the result at the screen.
+    Calibrate(Target, Option<String>),
 }
 
 /// An answer to a request.
@@ -144,6 +213,15 @@ pub struct Job {
     pub sigma: [f64; 6],
     /// Score of the found part, 0 to 1.
     pub score: f64,
+    /// Path of the recording of a scan or calibration; empty of other jobs.
+    pub recording: String,
+    /// Shots and points of a finished scan.
+    pub shots: u32,
+    pub points: u32,
+    /// Number of the calibration's target; 0 of other jobs.
+    pub target: u16,
+    /// Verdict of a finished calibration.
+    pub verdict: Verdict,
 }
 
 /// The robot, by the bits of its register.
@@ -168,40 +246,48 @@ pub struct Seen {
     pub inserted: u16,
 }
 
+/// A number of two registers, high word first.
+fn word(registers: &[u16], at: usize) -> u32 {
+    u32::from(registers[at]) << 16 | u32::from(registers[at + 1])
+}
+
 /// A signed number of two registers.
 fn number(registers: &[u16], at: usize) -> f64 {
-    f64::from((u32::from(registers[at]) << 16 | u32::from(registers[at + 1])) as i32)
+    f64::from(word(registers, at) as i32)
 }
 
 fn pose(registers: &[u16], at: usize) -> [f64; 6] {
     std::array::from_fn(|k| number(registers, at + 2 * k) / if k < 3 { PER_MM } else { PER_DEGREE })
 }
 
-fn letters(length: u16, registers: &[u16]) -> String {
-    let bytes = registers.iter().flat_map(|r| r.to_be_bytes()).take(usize::from(length));
+/// Words behind their length; none of no registers.
+fn letters(registers: &[u16]) -> String {
+    let Some((length, registers)) = registers.split_first() else { return String::new() };
+    let bytes = registers.iter().flat_map(|r| r.to_be_bytes()).take(usize::from(*length));
     bytes.map(|b| if b.is_ascii_graphic() || b == b' ' { char::from(b) } else { '?' }).collect()
 }
 
 /// The names of the bits of two registers.
 fn gates(registers: &[u16], at: usize) -> Vec<&'static str> {
-    let word = u32::from(registers[at]) << 16 | u32::from(registers[at + 1]);
-    let named = (0..32).filter(|k| word >> k & 1 == 1);
+    let bits = word(registers, at);
+    let named = (0..32).filter(|k| bits >> k & 1 == 1);
     named.map(|k| GATES.get(k).copied().unwrap_or("another gate")).collect()
 }
 
 /// The answer in registers 0 to 120.
 pub fn answer(r: &[u16]) -> Answer {
-    Answer {
-        error: r[4],
-        words: letters(r[20], &r[21..]),
-        pose: pose(r, 8),
-        shots: r[6],
-        score: f64::from(r[7]) / 1000.0,
-    }
+    Answer { error: r[4], words: letters(&r[20..]), pose: pose(r, 8), shots: r[6], score: f64::from(r[7]) / 1000.0 }
 }
 
-/// What registers 121 to 153 say, beside those from 0 and the words from 154 on.
-pub fn seen(answers: &[u16], jobs: &[u16], words: &[u16]) -> Seen {
+/// Whether the job of these registers makes something of a recording.
+pub fn makes(jobs: &[u16]) -> bool {
+    matches!(jobs[6], SCAN | CALIBRATE)
+}
+
+/// What registers 121 to 153 say, beside those from 0, the words from 154 on, and what was made of a recording; both are
+/// empty if they were not read.
+pub fn seen(answers: &[u16], jobs: &[u16], words: &[u16], made: &[u16]) -> Seen {
+    let made = if made.is_empty() { &[0; MADE.1 as usize] } else { made };
     let name = |k: u16| PHASES.get(usize::from(k)).copied().unwrap_or("another phase");
     let on = |bit: usize| jobs[0] >> bit & 1 == 1;
     let sigma = |k: usize| match jobs[27 + k] {
@@ -209,19 +295,24 @@ pub fn seen(answers: &[u16], jobs: &[u16], words: &[u16]) -> Seen {
         x => f64::from(x) / PER_SIGMA,
     };
     let job = Job {
-        number: u32::from(jobs[4]) << 16 | u32::from(jobs[5]),
+        number: word(jobs, 4),
         stage: Stage::of(jobs[1]),
         procedure: jobs[6],
         phase: name(jobs[2]),
         asks: name(jobs[3]),
         error: jobs[7],
-        words: words.split_first().map(|(length, rest)| letters(*length, rest)).unwrap_or_default(),
+        words: letters(words),
         found: jobs[10],
         judged: gates(jobs, 11),
         passed: gates(jobs, 13),
         pose: pose(jobs, 15),
         sigma: std::array::from_fn(sigma),
         score: f64::from(answers[7]) / 1000.0,
+        recording: letters(&made[6..]),
+        shots: word(made, 2),
+        points: word(made, 4),
+        target: made[0],
+        verdict: Verdict::of(made[1]),
     };
     let robot = Robot { linked: on(0), armed: on(1), attended: on(2), moves: on(3), look: on(4) };
     Seen { jobs: true, robot, job, ended: jobs[8], inserted: jobs[9] }
@@ -239,6 +330,12 @@ pub fn is_name(name: &str) -> bool {
     (1..=40).contains(&name.len()) && name.chars().all(plain)
 }
 
+/// Whether a recording's path can be written into the registers: 1 to 40 plain characters. The station decides whether
+/// it is one.
+pub fn is_recording(path: &str) -> bool {
+    (1..=40).contains(&path.len()) && path.bytes().all(|b| b.is_ascii_graphic() || b == b' ')
+}
+
 fn two(number: f64) -> [u16; 2] {
     // A number out of range becomes the nearest one there is, which the station refuses.
     let number = number.round() as i32 as u32;
@@ -246,6 +343,11 @@ fn two(number: f64) -> [u16; 2] {
 }
 
 impl Ask {
+    /// Whether a station that runs jobs needs the registers of scans and calibrations for it.
+    pub fn makes(&self) -> bool {
+        matches!(self, Ask::Scan(_) | Ask::Calibrate(..))
+    }
+
     /// The registers from 1 on that make this request.
     pub fn registers(&self) -> Vec<u16> {
         let named = |word: u16, name: &str| {
@@ -256,13 +358,19 @@ impl Ask {
             }
             out
         };
+        // Without jobs the table ends before the sweep. A name of before is not left there.
+        let recorded = |word: u16, target: u16, name: &Option<String>| {
+            let mut out = named(word, name.as_deref().unwrap_or_default())[..35].to_vec();
+            out[1] = target;
+            out
+        };
         match self {
-            Ask::Scan => vec![1],
+            Ask::Scan(name) => recorded(SCAN, 0, name),
+            Ask::Calibrate(target, name) => recorded(CALIBRATE, *target as u16, name),
             Ask::Pose(pose) => {
                 let scaled = |(k, x): (usize, &f64)| two(x * if k < 3 { PER_MM } else { PER_DEGREE });
                 [2, 0, 0].into_iter().chain(pose.iter().enumerate().flat_map(scaled)).collect()
             }
-            // Without jobs the table ends before the sweep.
             Ask::Find(name) => named(3, name)[..35].to_vec(),
             Ask::Give(which) => vec![4, *which, 0],
             Ask::Insert(name, sweep_mm) => {
@@ -287,7 +395,7 @@ mod tests {
         jobs[27..33].copy_from_slice(&[213, 65535, 65535, 500, 65535, 0]);
         let mut answers = vec![0u16; 121];
         answers[7] = 913;
-        let seen = seen(&answers, &jobs, &[7, 0x6e6f, 0x2072, 0x6f6f, 0x6d00]);
+        let seen = seen(&answers, &jobs, &[7, 0x6e6f, 0x2072, 0x6f6f, 0x6d00], &[]);
         assert_eq!(seen.robot, Robot { linked: true, armed: true, attended: false, moves: true, look: true });
         let job = &seen.job;
         assert_eq!((job.number, job.stage, job.phase, job.asks), (70_001, Stage::Runs, "insert", "insert"));
@@ -306,15 +414,47 @@ mod tests {
         let pose = Ask::Pose([300.0, -20.0, 420.0, 180.0, -0.0001, 90.0]).registers();
         assert_eq!(pose[3..], [4, 37856, 65535, 45536, 6, 26784, 27, 30528, 65535, 65535, 13, 48032]);
         assert_eq!(Ask::Give(2).registers(), [4, 2, 0]);
+        let scan = Ask::Scan(Some("a/b".into())).registers();
+        assert_eq!((scan.len(), &scan[..2], &scan[15..18]), (35, &[1, 0][..], &[0x612f, 0x6200, 0][..]));
+        assert_eq!(Ask::Scan(None).registers()[15..], [0; 20], "the newest, whatever was named before");
+        let plane = Ask::Calibrate(Target::LaserPlane, Some("a".into())).registers();
+        assert_eq!((plane.len(), &plane[..3], plane[15]), (35, &[7, 3, 0][..], 0x6100));
+        assert_eq!(Target::ALL.map(|t| t as u16), [1, 2, 3, 4, 5]);
+        assert!(is_recording("a b/c(1)") && !is_recording("") && !is_recording("\u{fc}"));
+        assert!(is_recording(&"x".repeat(40)) && !is_recording(&"x".repeat(41)) && !is_recording("a\0b"));
         assert!(is_name("led-2_b") && !is_name("../led") && !is_name("") && !is_name(&"x".repeat(41)));
+    }
+
+    #[test]
+    fn what_was_made_of_a_recording_is_read_behind_the_rest() {
+        let mut jobs = vec![0u16; 33];
+        let read = |jobs: &[u16], made: &[u16]| seen(&[0; 121], jobs, &[], made).job;
+        (jobs[1], jobs[6]) = (3, 1);
+        let mut made = vec![0u16; 107];
+        made[..9].copy_from_slice(&[0, 0, 0, 70, 1, 4465, 3, 0x612f, 0x6200]);
+        let job = read(&jobs, &made);
+        assert_eq!((job.shots, job.points, job.recording.as_str()), (70, 70_001, "a/b"));
+        assert_eq!((job.target, job.verdict), (0, Verdict::None));
+        for (number, verdict) in (1..).zip([Verdict::Good, Verdict::Usable, Verdict::BadlyDetermined, Verdict::Refused])
+        {
+            made[..2].copy_from_slice(&[4, number]);
+            let job = read(&jobs, &made);
+            assert_eq!((job.target, job.verdict, job.verdict.is_acceptable()), (4, verdict, number < 3));
+        }
+        let none = read(&jobs, &[]);
+        assert_eq!((none.shots, none.recording.as_str(), none.verdict), (0, "", Verdict::None));
+        assert!(makes(&jobs));
+        jobs[6] = 5;
+        assert!(!makes(&jobs) && Ask::Scan(None).makes() && !Ask::Stop.makes());
     }
 
     /// A station may show numbers that this program does not know yet.
     #[test]
     fn unknown_numbers_are_no_fault() {
         let all = vec![u16::MAX; 121];
-        let seen = seen(&all, &all[..33], &all[..101]);
+        let seen = seen(&all, &all[..33], &all[..101], &all[..107]);
         assert_eq!((seen.job.phase, seen.job.stage), ("another phase", Stage::None));
         assert_eq!((seen.job.judged.len(), seen.job.words.len()), (32, 200));
+        assert_eq!((seen.job.verdict, seen.job.target, seen.job.recording.len()), (Verdict::None, u16::MAX, 200));
     }
 }

@@ -86,6 +86,7 @@ fn wanted(options: &Options) -> Wanted<'_> {
     Wanted {
         address: options.station.as_deref().unwrap_or_default(),
         recipes: &options.recipe,
+        recordings: &options.recording,
         notation: options.notation,
         frame: &options.frame,
     }

@@ -26,6 +26,7 @@ Examples:
   sheetlight-ros2 - --connect tcp/192.168.0.20:7447 --namespace /cell3 < board7.mcap
   sheetlight-ros2 --station 127.0.0.1:5020 --recipe led --notation denso
   ros2 service call /sheetlight/insert/led std_srvs/srv/Trigger
+  ros2 service call /sheetlight/scan std_srvs/srv/Trigger
 
 Without --connect and --listen it connects to a router of this machine: tcp/127.0.0.1:7447.
 Services start jobs. They confirm no motion: a person does that at the station's screen.
@@ -40,8 +41,11 @@ pub struct Options {
         conflicts_with_all = ["input", "rate", "delay", "stay"])]
     pub station: Option<String>,
     /// A recipe of the station that gets services insert and find; may be repeated
-    #[arg(long, value_name = "NAME", value_parser = recipe, requires = "station", conflicts_with = "input")]
+    #[arg(long, value_name = "NAME", value_parser = word, requires = "station", conflicts_with = "input")]
     pub recipe: Vec<String>,
+    /// A recording of the station that gets a service scan, beside the newest one's; may be repeated
+    #[arg(long, value_name = "NAME", value_parser = word, requires = "station", conflicts_with = "input")]
+    pub recording: Vec<String>,
     /// Order of the angles in the station's poses; with it insertion poses are sent
     #[arg(long, value_enum, requires = "station", conflicts_with = "input")]
     pub notation: Option<Notation>,
@@ -99,11 +103,11 @@ fn station(text: &str) -> Result<String, String> {
     }
 }
 
-/// Services are named after recipes, and names of ROS 2 have fewer letters than names of recipes.
-fn recipe(text: &str) -> Result<String, String> {
+/// Services are named after recipes and recordings, and names of ROS 2 have fewer letters than their names.
+fn word(text: &str) -> Result<String, String> {
     match is_word(text) && text.len() <= 40 {
         true => Ok(text.to_owned()),
-        false => Err("wanted 1 to 40 letters, digits and _, a letter first; store the recipe under such a name".into()),
+        false => Err("wanted 1 to 40 letters, digits and _, a letter first; store it under such a name".into()),
     }
 }
 
@@ -181,9 +185,11 @@ mod tests {
             &["--station", "127.0.0.1"],
             &["--station", "127.0.0.1:5020", "--rate", "1"],
             &["--station", "127.0.0.1:5020", "--recipe", "led-2"],
+            &["--station", "127.0.0.1:5020", "--recording", "a/b"],
             &["--station", "127.0.0.1:5020", "--frame", "/base"],
             &["--station", "127.0.0.1:5020", "--notation", "abb"],
             &["a", "--recipe", "led"],
+            &["a", "--recording", "board"],
             &["a", "--notation", "kuka"],
             &["a", "--frame", "b"],
             &[],

@@ -37,6 +37,7 @@ TRIGGER = (
     "std_srvs::srv::dds_::Trigger_/RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"
 )
 EMPTY = b"\0\1\0\0\0"
+TARGETS = ["camera", "hand_eye", "laser_plane", "pointer", "axis"]
 BEGUN = []
 # A job of the simulated cell on a busy machine.
 PATIENT = 900.0
@@ -120,7 +121,7 @@ def statuses(heard):
 
 def graph(at):
     """Node, topics and services appear as rmw_zenoh's own do, each with a number of its own."""
-    seen = until("the tokens", lambda: (lambda t: t if len(t) == 6 else None)(tokens(at, 0)))
+    seen = until("the tokens", lambda: (lambda t: t if len(t) == 12 else None)(tokens(at, 0)))
     zid = next(t for t in seen if "/NN/" in t).split("/")[2]
     name = lambda kind: f"{kind.replace('/', '::').replace('::msg::', '::msg::dds_::')}_/{STORE.hash_rihs01(kind)}"
     kept, once = "::,1:,:,:,,", ":1:,1:,:,:,,"
@@ -128,6 +129,8 @@ def graph(at):
         f"SS/%/%/sheetlight/%sheetlight%insert%{PART}/{TRIGGER}/::,10:,:,:,,",
         f"SS/%/%/sheetlight/%sheetlight%find%{PART}/{TRIGGER}/::,10:,:,:,,",
         f"SS/%/%/sheetlight/%sheetlight%stop/{TRIGGER}/::,10:,:,:,,",
+        f"SS/%/%/sheetlight/%sheetlight%scan/{TRIGGER}/::,10:,:,:,,",
+        *(f"SS/%/%/sheetlight/%sheetlight%calibrate%{t}/{TRIGGER}/::,10:,:,:,," for t in TARGETS),
         f"MP/%/%/sheetlight/%diagnostics/{name('diagnostic_msgs/msg/DiagnosticArray')}/{kept}",
         f"MP/%/%/sheetlight/%sheetlight%insertion/{name('geometry_msgs/msg/PoseStamped')}/{once}",
     }
@@ -136,7 +139,7 @@ def graph(at):
         (token,) = [t for t in seen if t.endswith(f"/{tail}")]
         number = int(token.removesuffix(f"/{tail}").removeprefix(f"@ros2_lv/0/{zid}/0/"))
         numbers.add(number)
-    assert len(numbers) == 5 and 0 not in numbers, numbers
+    assert len(numbers) == 11 and 0 not in numbers, numbers
 
 
 def refusals(c, s):
@@ -146,7 +149,10 @@ def refusals(c, s):
     assert not good and words.startswith("refused, 9: ") and "not armed" in words, words
     good, words = c.call(f"find/{PART}")
     assert not good and words.startswith("refused, 3: "), words
-    assert c.raw("insert/none")[0] == []
+    for service in ("scan", *(f"calibrate/{t}" for t in TARGETS)):
+        good, words = c.call(service)
+        assert not good and words.startswith("refused, 10: ") and "press Operate" in words, words
+    assert c.raw("insert/none")[0] == [] and c.raw("scan/none")[0] == [] and c.raw("calibrate/joint")[0] == []
     chance = random.Random(7)
     for k in range(int(foreign)):
         payload = chance.randbytes(chance.randrange(0, 200))
@@ -255,19 +261,53 @@ def lost(c, s, op, heard):
     assert again.end() == 0
 
 
+def made(c, s):
+    """Scans and calibrations from recordings, as the screen's own records have them. Nothing is accepted."""
+    station = os.path.join(s.station, "calibration", "camera.json")
+    with open(station, "rb") as f:
+        before = f.read()
+    s.json("POST", "/lease")
+    known = jobs(s)
+    # None of the recordings has boards on an axis; one that is named is there, and the job says why it cannot use it.
+    good, words = c.call("calibrate/axis")
+    assert not good and words.startswith("refused, 4: no complete recording of boards"), words
+    assert jobs(s) == known
+    good, words = c.call("scan/intrinsics")
+    job = s.json("GET", "/jobs")[0]
+    assert not good and " failed, error " in words and words.endswith("; recording intrinsics"), words
+    assert job["problem"]["what"][:60] in words, (job["problem"], words)
+    s.json("POST", "/lease")
+    good, words = c.call("calibrate/camera")
+    job = s.json("GET", "/jobs")[0]
+    wanted = f"job {int(job['id'].split('-')[0])} done: camera calibrated from intrinsics; {job['outcome']['verdict']}; "
+    assert good and words == wanted + "a person has to accept it at the screen", (words, job)
+    assert job["order"]["target"] == "camera" and job["outcome"]["accepted"] is False, job
+    with open(station, "rb") as f:
+        assert f.read() == before, "a calibration was stored that nobody accepted"
+    for service in ("scan/scan", "scan"):
+        s.json("POST", "/lease")
+        good, words = c.call(service)
+        job = s.json("GET", "/jobs")[0]
+        o, number = job["outcome"], int(job["id"].split("-")[0])
+        assert good and words == f"job {number} done: scanned scan; {o['shots']} shots, {o['points']} points", (words, o)
+    print(words)
+
+
 def found(address, at):
     """The part of a recipe is found in the last scan of the screen, or it is not; nothing can be inserted there."""
     recorded = os.path.join(folder, "recorded")
-    subprocess.run([sheetlight, "--quiet", "simulate", "--out", recorded, "--set", "scan"], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([sheetlight, "--quiet", "simulate", "--out", recorded, "--set", "scan,intrinsics"], check=True, stdout=subprocess.DEVNULL)
     s = Server(sheetlight, recorded, "--recordings", recorded, "--modbus", "0")
     heard, c = Heard(at), Client(at)
-    node = begin(s, address, "led", "dimm")
+    node = begin(s, address, "led", "dimm", recordings=["scan", "intrinsics", "scan"])
     until("the station", lambda: any(v for _, _, v in statuses(heard)))
-    scan = s.job({"procedure": "scan", "recording": "scan"})
-    assert scan["state"] == "done", scan
+    made(c, s)
+    scan = s.json("GET", "/jobs")[0]
     good, words = c.call("insert/led")
     assert not good and words.startswith("refused, 9: "), words
+    s.json("POST", "/lease")
     good, words = c.call("find/led")
+    assert s.json("GET", "/jobs")[0]["order"]["scans"] == [scan["id"]]
     outcome = s.json("GET", "/jobs")[0]["outcome"]
     assert good and ": found; " in words, (words, outcome)
     # A station without [tool] states its poses as matrices.
@@ -295,8 +335,8 @@ def found(address, at):
     node = begin(s, address, "led", "led")
     count = len(heard.of("/diagnostics"))
     until("the station", lambda: any(v for _, _, v in statuses(heard)[count:]))
-    # The node, three services, two topics.
-    assert len(tokens(at, 0)) == 6, tokens(at, 0)
+    # The node, nine services, two topics.
+    assert len(tokens(at, 0)) == 12, tokens(at, 0)
     time.sleep(1.0)
     assert len(heard.of("/sheetlight/insertion")) == 2, "an old pose was sent"
     ends(node)
@@ -304,10 +344,10 @@ def found(address, at):
     heard.subscriber.undeclare()
 
 
-def begin(s, address, *recipes):
+def begin(s, address, *recipes, recordings=()):
     """A node that shows the station."""
     words = ["--station", door(s), "--notation", "denso", "--frame", "base_link", "--connect", address]
-    words += [w for r in recipes for w in ("--recipe", r)]
+    words += [w for r in recipes for w in ("--recipe", r)] + [w for r in recordings for w in ("--recording", r)]
     BEGUN.append(subprocess.Popen([program, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE))
     return BEGUN[-1]
 

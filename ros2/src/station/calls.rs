@@ -4,7 +4,7 @@
 
 use super::message::missed;
 use super::watch::Watch;
-use sheetlight_registers::{Ask, Job, Stage, Station, Unanswered};
+use sheetlight_registers::{Ask, Job, Stage, Station, Target, Unanswered};
 
 /// What a call asks for.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,6 +13,10 @@ pub enum Call {
     Insert(String),
     /// Finds a recipe's part in the last scan.
     Find(String),
+    /// Scans a recording, or the newest one.
+    Scan(Option<String>),
+    /// Calibrates from the newest recording that suits.
+    Calibrate(Target),
     /// Ends what runs, and halts the arm.
     Stop,
 }
@@ -23,6 +27,9 @@ impl Call {
         match self {
             Call::Insert(recipe) => format!("/sheetlight/insert/{recipe}"),
             Call::Find(recipe) => format!("/sheetlight/find/{recipe}"),
+            Call::Scan(None) => "/sheetlight/scan".to_owned(),
+            Call::Scan(Some(recording)) => format!("/sheetlight/scan/{recording}"),
+            Call::Calibrate(target) => format!("/sheetlight/calibrate/{}", target.word()),
             Call::Stop => "/sheetlight/stop".to_owned(),
         }
     }
@@ -39,6 +46,8 @@ impl Call {
         let ask = match self {
             Call::Insert(recipe) => Ask::Insert(recipe.clone(), None),
             Call::Find(recipe) => Ask::Find(recipe.clone()),
+            Call::Scan(recording) => Ask::Scan(recording.clone()),
+            Call::Calibrate(target) => Ask::Calibrate(*target, None),
             Call::Stop => Ask::Stop,
         };
         match station.ask_here(ask) {
@@ -63,10 +72,20 @@ impl Call {
     fn outcome(&self, job: &Job) -> (bool, String) {
         let number = job.number;
         if job.stage != Stage::Done || job.error != 0 {
-            return (false, format!("job {number} {}, error {}: {}", job.stage.word(), job.error, job.words));
+            let ended = format!("job {number} {}, error {}: {}", job.stage.word(), job.error, job.words);
+            return (false, ended + &recording(job));
         }
         let good = match self {
             Call::Insert(_) => job.phase == "inserted",
+            Call::Scan(_) => {
+                let scanned = format!("job {number} done: scanned {}", job.recording);
+                return (true, format!("{scanned}; {} shots, {} points", job.shots, job.points));
+            }
+            Call::Calibrate(target) => {
+                let made = format!("job {number} done: {} calibrated from {}", target.word(), job.recording);
+                let next = "a person has to accept it at the screen";
+                return (job.verdict.is_acceptable(), format!("{made}; {}; {next}", job.verdict.word()));
+            }
             _ => job.found == 1,
         };
         let gates = missed(job);
@@ -79,6 +98,11 @@ impl Call {
         };
         (good, format!("job {number} done: {what}{}", pose(job)))
     }
+}
+
+/// The recording of a job, in words.
+fn recording(job: &Job) -> String {
+    if job.recording.is_empty() { String::new() } else { format!("; recording {}", job.recording) }
 }
 
 /// The pose that a job found, in words.
@@ -110,6 +134,7 @@ fn unheard(unanswered: &Unanswered) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sheetlight_registers::Verdict;
 
     fn job() -> Job {
         Job { number: 12, stage: Stage::Done, phase: "inserted", found: 1, ..Job::default() }
@@ -133,5 +158,26 @@ mod tests {
         let missed = Job { found: 2, judged: vec!["score", "margin"], passed: vec!["margin"], ..job() };
         assert_eq!(find.outcome(&missed), (false, "job 12 done: not taken, gates missed: score".into()));
         assert_eq!(find.outcome(&Job { found: 0, ..job() }), (false, "job 12 done: not found".into()));
+    }
+
+    #[test]
+    fn scans_and_calibrations_name_their_recording() {
+        let scan = Call::Scan(None);
+        let of = |verdict| Job { recording: "a/b".into(), verdict, found: 0, phase: "", ..job() };
+        let scanned = Job { shots: 70, points: 70_001, ..of(Verdict::None) };
+        let words = "job 12 done: scanned a/b; 70 shots, 70001 points";
+        assert_eq!(scan.outcome(&scanned), (true, words.into()));
+        let failed = Job { stage: Stage::Failed, error: 14, words: "no plane".into(), ..of(Verdict::None) };
+        assert_eq!(scan.outcome(&failed), (false, "job 12 failed, error 14: no plane; recording a/b".into()));
+        let plane = Call::Calibrate(Target::LaserPlane);
+        let words = |verdict| {
+            format!("job 12 done: laser_plane calibrated from a/b; {verdict}; a person has to accept it at the screen")
+        };
+        assert_eq!(plane.outcome(&of(Verdict::Good)), (true, words("good")));
+        assert_eq!(plane.outcome(&of(Verdict::Usable)), (true, words("usable")));
+        // A station states an error for these; a verdict that is not known is no success either.
+        assert!(!plane.outcome(&of(Verdict::BadlyDetermined)).0 && !plane.outcome(&of(Verdict::None)).0);
+        assert_eq!(plane.service(), "/sheetlight/calibrate/laser_plane");
+        assert_eq!(Call::Scan(Some("b7".into())).service(), "/sheetlight/scan/b7");
     }
 }

@@ -145,6 +145,8 @@ fn values(seen: &Seen) -> Vec<(&'static str, String)> {
         ("waits for a person", job.asks.to_owned()),
         ("job error", job.error.to_string()),
         ("job error words", job.words.clone()),
+        ("recording", job.recording.clone()),
+        ("calibration verdict", job.verdict.word().to_owned()),
         ("gates missed", missed(job).join(", ")),
         ("jobs ended", seen.ended.to_string()),
         ("components inserted", seen.inserted.to_string()),

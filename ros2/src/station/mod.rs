@@ -16,7 +16,7 @@ use crate::door::{Answered, Door, Topic};
 use crate::fault::{Fault, fault};
 use crate::qos::Qos;
 use calls::Call;
-use sheetlight_registers::{Job, Stage, Station};
+use sheetlight_registers::{Job, Stage, Station, Target};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
@@ -33,6 +33,8 @@ pub struct Wanted<'a> {
     pub address: &'a str,
     /// The recipes that have services.
     pub recipes: &'a [String],
+    /// The recordings that have a service.
+    pub recordings: &'a [String],
     /// Order of the angles of its poses; without it no poses are sent.
     pub notation: Option<Notation>,
     /// The frame of its poses.
@@ -46,13 +48,10 @@ pub fn serve(door: &mut Door, wanted: &Wanted, stop: &dyn Fn() -> bool) -> Resul
     let station = Station::begin(wanted.address.to_owned(), move |seen| told.saw(seen));
     let station =
         station.map_err(|e| fault(format!("no thread: {e}"), "the system has none left", "close other programs"))?;
-    // A recipe that is named twice would answer each call twice.
-    let recipes: BTreeSet<&String> = wanted.recipes.iter().collect();
-    let jobs = recipes.into_iter().flat_map(|r| [Call::Insert(r.clone()), Call::Find(r.clone())]);
     let mut services = Vec::new();
-    for call in jobs.chain([Call::Stop]) {
+    for call in calls(wanted) {
         let (station, watch, service) = (station.clone(), watch.clone(), call.service());
-        crate::say(&format!("service {:<32} {}", door.name(&service), message::TRIGGER.0));
+        crate::say(&format!("service {:<34} {}", door.name(&service), message::TRIGGER.0));
         services.push(door.answer(&service, message::TRIGGER, move |request| {
             if !message::is_request(request) {
                 return Answered::Foreign("wanted an empty request of std_srvs/srv/Trigger, as CDR");
@@ -86,6 +85,14 @@ pub fn serve(door: &mut Door, wanted: &Wanted, stop: &dyn Fn() -> bool) -> Resul
         std::thread::sleep(LOOK);
     }
     Ok(())
+}
+
+/// The calls that have services. A recipe or recording that is named twice would answer each call twice.
+fn calls(wanted: &Wanted) -> impl Iterator<Item = Call> {
+    let once = |names: &[String]| names.iter().cloned().collect::<BTreeSet<String>>();
+    let of_parts = once(wanted.recipes).into_iter().flat_map(|r| [Call::Insert(r.clone()), Call::Find(r)]);
+    let scans = once(wanted.recordings).into_iter().map(Some).chain([None]).map(Call::Scan);
+    of_parts.chain(scans).chain(Target::ALL.map(Call::Calibrate)).chain([Call::Stop])
 }
 
 /// The topic of insertion poses.
