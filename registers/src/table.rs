@@ -284,8 +284,8 @@ pub fn makes(jobs: &[u16]) -> bool {
     matches!(jobs[6], SCAN | CALIBRATE)
 }
 
-/// What registers 121 to 153 say, beside those from 0, the words from 154 on, and what was made of a recording; both are
-/// empty if they were not read.
+/// What registers 121 to 153 say, beside those from 0, the words from 154 on, and what was made of a recording; both
+/// are empty if they were not read.
 pub fn seen(answers: &[u16], jobs: &[u16], words: &[u16], made: &[u16]) -> Seen {
     let made = if made.is_empty() { &[0; MADE.1 as usize] } else { made };
     let name = |k: u16| PHASES.get(usize::from(k)).copied().unwrap_or("another phase");

@@ -52,8 +52,8 @@ impl Place {
     }
 
     /// Name of the newest complete recording that suits: readable, with pictures, and no recorder writes into it. The
-    /// newest one has the latest meta.json, which a recorder writes first. Of several at the same time it is the last in
-    /// the list.
+    /// newest one has the latest meta.json, which a recorder writes first. Of several at the same time it is the last
+    /// in the list.
     ///
     /// # Errors
     /// The folder cannot be read or has too many recordings, or there is none; `what` says which is wanted.
