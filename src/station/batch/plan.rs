@@ -67,6 +67,7 @@ impl<'a> Folder<'a> {
     ///
     /// # Errors
     /// A folder without one.
+    #[cfg(feature = "tables")]
     pub fn open(out: &'a Path) -> Result<Folder<'a>> {
         let identity = read(out)?.ok_or_else(|| {
             Fault::input(format!("{}: contains no {BATCH}", out.display()))
@@ -91,6 +92,7 @@ impl<'a> Folder<'a> {
     }
 
     /// Its list.
+    #[cfg(feature = "tables")]
     pub fn manifest(&self) -> Result<Manifest> {
         let manifest = Manifest::open(&self.out.join(MANIFEST))?;
         if manifest.sha256() == self.identity.manifest {
