@@ -133,7 +133,7 @@ pub(super) fn flatten(before: &str, value: &Value, out: &mut BTreeMap<String, Va
 mod tests {
     use super::*;
     use sheetlight::geometry::{Axis, AxisKind, Base, Camera, CountUnit, Flange, Rigid, Sensor};
-    use sheetlight::rig::{Calibration, Covariance, Joint, JointCovariance};
+    use sheetlight::rig::{Calibration, Covariance, Joint, JointCovariance, Quality};
     use sheetlight::simulate::Station;
     use std::collections::BTreeMap;
 
