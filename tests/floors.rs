@@ -62,7 +62,6 @@ const HOMES: &[(&str, &str)] = &[
     ("argon2", "web"),
     ("ash", "gpu"),
     ("axum", "web"),
-    ("base64", "station"),
     ("calib_targets_charuco", "calibrate"),
     ("calib_targets_chessboard", "calibrate"),
     ("calib_targets_core", "calibrate"),
@@ -99,6 +98,7 @@ const HOMES: &[(&str, &str)] = &[
 
 /// Outside crates that any floor may use: numbers, files, pages, names of values, threads, chance.
 const COMMON: &[&str] = &[
+    "base64",
     "bytemuck",
     "calib_targets_aruco",
     "csv",

@@ -22,6 +22,8 @@ pub use model::template::Template;
 pub use scene::{Kind, Layer, Region, Scene};
 pub use search::accelerator::Accelerator;
 pub use search::area::Area;
+pub use search::examples::{Example, teach_examples};
 pub use search::full::{Match, find, find_in, find_on};
 pub use search::options::SearchOptions;
 pub use search::refine::Pose;
+pub use search::taught::{Weak, find_taught};

@@ -6,6 +6,8 @@ pub mod drawn_edges;
 pub mod edge_index;
 pub mod face;
 pub mod gradient;
+pub mod levels;
+pub mod masked;
 pub mod mirror;
 pub mod outline;
 pub mod shape;

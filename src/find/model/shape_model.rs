@@ -170,6 +170,22 @@ impl ShapeModel {
         Self::finish(self.levels.into_iter().map(chosen).collect(), "the part of the region that is seen")
     }
 
+    /// The model of what `confirm` makes of each level's edge points, thinned to at most `most` on a level.
+    ///
+    /// # Errors
+    /// Too few edge points remain.
+    pub(in crate::find) fn confirmed(
+        self,
+        most: usize,
+        confirm: impl Fn(usize, &ModelPoint) -> Option<ModelPoint>,
+    ) -> Result<ShapeModel> {
+        let of_level = |(level, points): (usize, &Vec<ModelPoint>)| {
+            let kept: Vec<ModelPoint> = points.iter().filter_map(|p| confirm(level, p)).collect();
+            thin(&kept, (1u64 << level) as f64, most)
+        };
+        Self::finish(self.levels.iter().enumerate().map(of_level).collect(), "what the examples have in common")
+    }
+
     fn finish(mut levels: Vec<Vec<ModelPoint>>, origin: &str) -> Result<ShapeModel> {
         let found = levels[0].len();
         if found < MIN_POINTS {

@@ -3,6 +3,7 @@
 //! Frame and unit: pixels of the picture, cells of the map; points of the model about the region's middle, turn 0 as
 //! in the picture.
 
+use super::levels::Levels;
 use super::shape_model::{MIN_POINTS, ModelOptions, ModelPoint, ShapeModel};
 use crate::fault::{Fault, Result};
 use crate::find::scene::{Kind, Region, Scene};
@@ -30,6 +31,35 @@ pub struct Template {
     pub options: ModelOptions,
     /// The part's edges.
     pub model: ShapeModel,
+    /// The region's grey levels, or heights; `None` in files of before they were stored, and in an even region.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub levels: Option<Levels>,
+    /// The further examples that it was taught from.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub examples: Vec<Taken>,
+    /// With further examples: number of the first one's edge points that the others confirm, and of all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub confirmed: Option<[usize; 2]>,
+}
+
+/// Where an example's part was found.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Taken {
+    /// Name of the picture, as stated then.
+    pub picture: String,
+    /// SHA-256 of the picture's file.
+    pub picture_sha256: String,
+    /// Column of the reference point, px.
+    pub x_px: f64,
+    /// Row of the reference point, px.
+    pub y_px: f64,
+    /// Turn against the first example, x towards y, degrees.
+    pub angle_deg: f64,
+    /// Score against the first example.
+    pub score: f64,
+    /// Correlation with the first example.
+    pub correlation: Option<f64>,
 }
 
 /// No picture gives edges farther than this from the part's middle, px.
@@ -83,11 +113,13 @@ impl Template {
         let [x, y, w, h] = region.unwrap_or([0, 0, image.width, image.height]);
         within([x, y, w, h], [image.width, image.height], "picture")?;
         let cells = cells([x, y, w, h]);
+        let seen = Scene::from_image_in_part(image, hidden);
+        let levels = Levels::of(&seen.layers[0].crop(cells));
         let model = match hidden {
-            None => ShapeModel::from_region(&Scene::from_image(image), cells, None, options)?,
+            None => ShapeModel::from_region(&seen, cells, None, options)?,
             Some(hidden) => {
                 let reference = [f64::from(x) + 0.5 * f64::from(w - 1), f64::from(y) + 0.5 * f64::from(h - 1)];
-                let carried = Scene::from_image_in_part(image, Some(hidden)).carried_on();
+                let carried = seen.carried_on();
                 let model = ShapeModel::from_region(&carried, cells, Some(reference), options)?;
                 let [columns, rows] = [hidden.width, hidden.height].map(|n| f64::from(n - 1));
                 let place = |v: f64, most: f64| v.round().clamp(0.0, most) as u32;
@@ -105,6 +137,9 @@ impl Template {
             region_px: [x, y, w, h],
             options: *options,
             model,
+            levels,
+            examples: vec![],
+            confirmed: None,
         })
     }
 
@@ -122,7 +157,9 @@ impl Template {
     ) -> Result<Template> {
         let region_px = region.unwrap_or([0, 0, map.width, map.height]);
         within(region_px, [map.width, map.height], "map")?;
-        let model = ShapeModel::from_region(&Scene::from_heights(map)?, cells(region_px), None, options)?;
+        let scene = Scene::from_heights(map)?;
+        let model = ShapeModel::from_region(&scene, cells(region_px), None, options)?;
+        let levels = Levels::of(&scene.layers[0].crop(cells(region_px)));
         let (picture, picture_sha256) = source;
         let mm_per_px = Some(map.cell);
         Ok(Template {
@@ -134,6 +171,9 @@ impl Template {
             region_px,
             options: *options,
             model,
+            levels,
+            examples: vec![],
+            confirmed: None,
         })
     }
 
@@ -185,6 +225,10 @@ fn cells([x, y, w, h]: [u32; 4]) -> Region {
 }
 
 fn check(template: &Template) -> std::result::Result<(), String> {
+    if let Some(levels) = &template.levels {
+        let [_, _, w, h] = template.region_px;
+        levels.check([w, h])?;
+    }
     let (model, kind) = match template.mm_per_px {
         None => (&template.model, Kind::Intensity),
         Some(mm) if mm > 0.0 && mm.is_finite() => (&template.model, Kind::Height),

@@ -51,6 +51,9 @@ pub struct Match {
     pub rivals: Vec<(Pose, f64)>,
     /// A rival that fits almost as well, in words.
     pub warning: Option<String>,
+    /// Normalised correlation of the template's values with the scene's, -1 to 1; `None` where the template has no
+    /// values or the scene shows less than half of them.
+    pub correlation: Option<f64>,
 }
 
 /// Finds the model in the scene, best match first. An empty list means that nothing reached the least score.
@@ -76,12 +79,24 @@ pub fn find_in(
     area: Option<&Area>,
     accelerator: Option<&Accelerator>,
 ) -> Result<Vec<Match>> {
+    find_where(scene, model, options, area, &|_| true, accelerator)
+}
+
+/// Like [`find_in`], for matches whose pose `also` accepts; it is asked before overlaps are resolved.
+pub(super) fn find_where(
+    scene: &Scene,
+    model: &ShapeModel,
+    options: &SearchOptions,
+    area: Option<&Area>,
+    also: &(dyn Fn(&Pose) -> bool + Sync),
+    accelerator: Option<&Accelerator>,
+) -> Result<Vec<Match>> {
     options.check()?;
-    let Some(area) = area else { return search(scene, model, options, &|_| true, accelerator) };
+    let Some(area) = area else { return search(scene, model, options, also, accelerator) };
     let cells = area.cells(scene, model, options)?;
     let (dx, dy) = (cells.x0 as f64, cells.y0 as f64);
     let shifted = |p: &Pose| Pose { x: p.x + dx, y: p.y + dy, ..*p };
-    let inside = |p: &Pose| area.holds(model, &shifted(p));
+    let inside = |p: &Pose| area.holds(model, &shifted(p)) && also(&shifted(p));
     let mut found = search(&scene.crop(cells), model, options, &inside, accelerator)?;
     for m in &mut found {
         m.pose = shifted(&m.pose);
@@ -175,7 +190,7 @@ fn beside_shadows(
 
 /// Contrast threshold: three times the noise, but not below a thousandth of the layer's strong slopes. Otherwise a
 /// noise-free picture would have rounding errors for edges.
-fn automatic(field: &Field) -> f32 {
+pub(super) fn automatic(field: &Field) -> f32 {
     let step = (field.gx.len() / 20_000).max(1);
     let mut m: Vec<f32> = (0..field.gx.len()).step_by(step).map(|i| field.magnitude(i)).collect();
     let top = m.len() * 99 / 100;
@@ -334,6 +349,7 @@ fn finish(
                 edge_rms_px: r.rms_px,
                 rivals,
                 warning,
+                correlation: None,
             },
         ));
     }
@@ -360,7 +376,7 @@ fn refined(
 }
 
 /// Share of the smaller of two turned boxes that lies in the other, by sampling a 9x9 grid.
-fn overlap(model: &ShapeModel, a: &Pose, b: &Pose) -> f64 {
+pub(super) fn overlap(model: &ShapeModel, a: &Pose, b: &Pose) -> f64 {
     let (small, large) = if a.scale <= b.scale { (a, b) } else { (b, a) };
     let (s, c) = large.angle.sin_cos();
     let mut inside = 0;
