@@ -14,3 +14,4 @@ mod foreign;
 mod insertion;
 mod maps;
 mod matching;
+mod witness;

@@ -1,5 +1,5 @@
-//! In: a part's template and pictures or height maps. Out: the part's position in each of them: JSON, CSV, a picture
-//! with the matches drawn in.
+//! In: a part's template, with its mask, and pictures or height maps. Out: the part's position in each of them: JSON,
+//! CSV, a picture with the matches drawn in.
 //! Frame and unit: pixels of each picture, cells of each map (x right, y down, an integer is a centre); in maps also mm
 //! in the grid frame; degrees, x towards y.
 
@@ -8,9 +8,12 @@ use crate::cli::terminal::console::Console;
 use crate::cli::terminal::outputs;
 use crate::cli::terminal::outputs::Inputs;
 use sheetlight::fault::{Fault, Result};
+use sheetlight::find::model::masked::{either, excluded};
 use sheetlight::find::search::picture::draw;
-use sheetlight::find::{Accelerator, Area, Match, ModelOptions, Scene, SearchOptions, Template, find_in};
-use sheetlight::raster::{Channel, Depth, Image, decode_in_part, load_in_part};
+use sheetlight::find::{
+    Accelerator, Area, Example, Match, ModelOptions, Scene, SearchOptions, Template, Weak, find_taught, teach_examples,
+};
+use sheetlight::raster::{Channel, Depth, Image, Mask, decode_in_part, load_in_part};
 use sheetlight::rig::hash_text;
 use sheetlight::scan::HeightMap;
 use std::path::{Path, PathBuf};
@@ -20,7 +23,8 @@ use std::path::{Path, PathBuf};
 /// The template is a picture that shows the part, whole or in --template-region, or a file that sheetlight teach
 /// --region wrote. Scan folders in place of pictures are searched by their heights; cells without a height count half.
 /// The score is the mean cosine between the template's directions and the picture's: a part of which three tenths are
-/// hidden scores about 0.7. If nothing is found, the list is empty and the exit code is 0.
+/// hidden scores about 0.7. Grey levels or heights are correlated as well. Without --score, matches in pictures that
+/// score 0.4 to 0.6 are listed too if their correlation is 0.8 or more. If nothing is found, the exit code is 0.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight match clip.png table.png --out clips.json
@@ -40,6 +44,9 @@ pub struct Args {
     /// Part in the template's picture, px: x,y of the top left pixel, width, height [default: all]
     #[arg(long, value_name = "X,Y,W,H", value_parser = numbers::<4>)]
     template_region: Option<[f64; 4]>,
+    /// White or opaque where the template's picture counts; of the picture's or the region's size
+    #[arg(long, value_name = "PICTURE")]
+    mask: Option<PathBuf>,
     /// Weakest edge of the template as a share of its strong ones; low includes texture
     #[arg(long, default_value_t = ModelOptions::default().contrast)]
     contrast: f64,
@@ -62,9 +69,12 @@ pub struct Args {
     /// Largest number of matches per picture
     #[arg(long)]
     most: Option<usize>,
-    /// Least score, 0.1 to 1
-    #[arg(long, default_value_t = SearchOptions::default().min_score)]
-    score: f64,
+    /// Least score, 0.1 to 1 [default: 0.6]
+    #[arg(long)]
+    score: Option<f64>,
+    /// Least score of matches in pictures whose grey levels correlate [default: 0.4 without --score]
+    #[arg(long, value_name = "SCORE")]
+    weak_score: Option<f64>,
     /// Largest overlap of two matches, as a share of the smaller one
     #[arg(long, default_value_t = SearchOptions::default().max_overlap)]
     overlap: f64,
@@ -110,6 +120,8 @@ struct Listed {
     edges: usize,
     edge_rms_px: f64,
     second_score: f64,
+    /// Null where the template has no levels or the picture shows less than half of them.
+    correlation: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     warning: Option<String>,
 }
@@ -130,11 +142,20 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let overlays = overlays(args);
     let results: Vec<PathBuf> =
         args.out.iter().flat_map(|o| [o.clone(), o.with_extension("csv")]).chain(overlays.iter().cloned()).collect();
-    let inputs = args.pictures.iter().chain([&args.template]).map(PathBuf::as_path);
+    let inputs = args.pictures.iter().chain([&args.template]).chain(&args.mask).map(PathBuf::as_path);
     let (scans, files): (Vec<&Path>, Vec<&Path>) = inputs.partition(|path| path.is_dir());
     let results: Vec<&Path> = results.iter().map(PathBuf::as_path).collect();
     outputs::check(&results, &Inputs { files: &files, scans: &scans, ..Inputs::default() })?;
     let template = template(args)?;
+    let weak = weak(args);
+    if args.weak_score.is_some() && template.mm_per_px.is_some() {
+        return Err(Fault::usage("--weak-score with a height map")
+            .cause("heights are compared, but round parts of other sizes correlate too")
+            .next("omit --weak-score and give --score"));
+    }
+    if template.levels.is_none() {
+        console.say("the template has no levels, so nothing is correlated: teach the part again");
+    }
     let accelerator = Accelerator::open();
     let (mut all, mut drawn) = (Vec::new(), Vec::new());
     for (k, path) in args.pictures.iter().enumerate() {
@@ -142,7 +163,8 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         let at = |e: Fault| e.at(path.display());
         let cells = template.cells_in(&scene).map_err(at)?;
         let options = SearchOptions { scales: options.scales.map(|s| s * cells), ..options };
-        let matches = find_in(&scene, &template.model, &options, area.as_ref(), accelerator.as_ref()).map_err(at)?;
+        let matches = find_taught(&scene, &template, &options, weak.as_ref(), area.as_ref(), accelerator.as_ref());
+        let matches = matches.map_err(at)?;
         if let Some(file) = overlays.get(k) {
             drawn.push((file, draw(&image, &template.model, &matches).to_png()));
         }
@@ -176,13 +198,23 @@ fn options(args: &Args) -> Result<SearchOptions> {
     let options = SearchOptions {
         angles_deg: args.angles.unwrap_or(defaults.angles_deg),
         scales: args.scales.unwrap_or(defaults.scales),
-        min_score: args.score,
+        min_score: args.score.unwrap_or(defaults.min_score),
         max_overlap: args.overlap,
         ignore_polarity: args.ignore_polarity,
         ..defaults.at_most(max_matches)
     };
     options.check()?;
     Ok(options)
+}
+
+/// Down to which score the correlation decides. A stated --score alone is a limit that nothing passes below.
+fn weak(args: &Args) -> Option<Weak> {
+    let usual = Weak::default();
+    match (args.weak_score, args.score) {
+        (Some(min_score), _) => Some(Weak { min_score, ..usual }),
+        (None, None) => Some(usual),
+        (None, Some(_)) => None,
+    }
 }
 
 fn template(args: &Args) -> Result<Template> {
@@ -193,11 +225,22 @@ fn template(args: &Args) -> Result<Template> {
                 .cause("a file of sheetlight teach has its region in it")
                 .next("omit --template-region, or give the picture"));
         }
+        if args.mask.is_some() {
+            return Err(Fault::usage("--mask with a taught part")
+                .cause("a file of sheetlight teach knows already what counts")
+                .next("give --mask to sheetlight teach, or give the picture"));
+        }
         return Template::parse(&sheetlight::files::read_text(path)?).map_err(|e| e.at(path.display()));
     }
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
     let options = ModelOptions { contrast: args.contrast, ..ModelOptions::default() };
-    taught(path, &name, args.template_region, (args.channel, args.bits), &options).map(|t| t.0)
+    let region = whole_region(args.template_region)?;
+    let mask = args.mask.as_deref();
+    if path.is_dir() {
+        return taught_map(path, &name, region, mask, &options).map(|t| t.0);
+    }
+    let part = Pictured::load(path, (args.channel, args.bits), mask, region)?;
+    teach_examples(&name, &[part.example()], region, &options, None).map_err(|e| e.at(path.display()))
 }
 
 fn depth(bits: u8) -> Depth {
@@ -230,35 +273,79 @@ fn grey(map: &HeightMap) -> Image {
     Image::from_u8(map.width, map.height, map.z.iter().map(level).collect())
 }
 
-/// The part in a region of a picture file or of a scan's height map, and the picture.
-pub(super) fn taught(
+/// A region in whole pixels.
+pub(super) fn whole_region(region: Option<[f64; 4]>) -> Result<Option<[u32; 4]>> {
+    let whole = |v: f64| (v.fract() == 0.0 && (0.0..1e6).contains(&v)).then_some(v as u32);
+    match region.map(|r| r.map(whole)) {
+        None => Ok(None),
+        Some([Some(x), Some(y), Some(w), Some(h)]) => Ok(Some([x, y, w, h])),
+        Some(_) => Err(Fault::usage("the template's region is not in whole pixels from 0 on")
+            .cause("millimetres, or a corner outside the picture")
+            .next("give x,y of the top left pixel, width and height")),
+    }
+}
+
+/// Where a mask's file excludes what a picture or map of this size shows.
+fn masked(file: &Path, size: [u32; 2], region: Option<[u32; 4]>) -> Result<Mask> {
+    let (mask, clear) = load_in_part(file, Channel::Luma, 8)?;
+    excluded(&mask, clear.as_ref(), size, region).map_err(|e| e.at(file.display()))
+}
+
+/// A picture file of a part.
+pub(super) struct Pictured {
+    pub image: Image,
+    /// Transparent pixels and those that a mask excludes.
+    hidden: Option<Mask>,
+    named: String,
+    sha256: String,
+}
+
+impl Pictured {
+    /// Reads the picture and its mask, which is as large as the picture or as its region.
+    pub fn load(
+        path: &Path,
+        (channel, bits): (Channel, u8),
+        mask: Option<&Path>,
+        region: Option<[u32; 4]>,
+    ) -> Result<Pictured> {
+        let bytes = sheetlight::files::read(path, MOST_BYTES)?;
+        let (image, hidden) = decode_in_part(&bytes, channel, depth(bits)).map_err(|e| e.at(path.display()))?;
+        let mask = mask.map(|file| masked(file, [image.width, image.height], region)).transpose()?;
+        Ok(Pictured { hidden: either(hidden, mask), image, named: named(path), sha256: hash_text(&bytes) })
+    }
+
+    pub fn example(&self) -> Example<'_> {
+        Example {
+            image: &self.image,
+            hidden: self.hidden.as_ref(),
+            picture: self.named.clone(),
+            sha256: self.sha256.clone(),
+        }
+    }
+}
+
+fn named(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The part in a region of a scan's height map, and the map as a picture. Masked cells count as not measured.
+pub(super) fn taught_map(
     path: &Path,
     name: &str,
-    region: Option<[f64; 4]>,
-    (channel, bits): (Channel, u8),
+    region: Option<[u32; 4]>,
+    mask: Option<&Path>,
     options: &ModelOptions,
 ) -> Result<(Template, Image)> {
-    let whole = |v: f64| (v.fract() == 0.0 && (0.0..1e6).contains(&v)).then_some(v as u32);
-    let region = match region.map(|r| r.map(whole)) {
-        None => None,
-        Some([Some(x), Some(y), Some(w), Some(h)]) => Some([x, y, w, h]),
-        Some(_) => {
-            return Err(Fault::usage("the template's region is not in whole pixels from 0 on")
-                .cause("millimetres, or a corner outside the picture")
-                .next("give x,y of the top left pixel, width and height"));
-        }
-    };
-    let at = |e: Fault| e.at(path.display());
-    let named = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    if path.is_dir() {
-        let map = HeightMap::load(path)?;
-        let source = (named, hash_text(&sheetlight::files::read(&path.join("height.tif"), MOST_BYTES)?));
-        return Ok((Template::teach_map(name, &map, region, source, options).map_err(at)?, grey(&map)));
+    let mut map = HeightMap::load(path)?;
+    let shown = grey(&map);
+    if let Some(file) = mask {
+        let (mask, width) = (masked(file, [map.width, map.height], region)?, map.width);
+        let cells = (0..).map(|i| (i % width, i / width));
+        map.z.iter_mut().zip(cells).filter(|(_, (x, y))| mask.get(*x, *y)).for_each(|(z, _)| *z = f32::NAN);
     }
-    let bytes = sheetlight::files::read(path, MOST_BYTES)?;
-    let (image, hidden) = decode_in_part(&bytes, channel, depth(bits)).map_err(at)?;
-    let source = (named, hash_text(&bytes));
-    Ok((Template::teach_in_part(name, &image, hidden.as_ref(), region, source, options).map_err(at)?, image))
+    let source = (named(path), hash_text(&sheetlight::files::read(&path.join("height.tif"), MOST_BYTES)?));
+    let taught = Template::teach_map(name, &map, region, source, options).map_err(|e| e.at(path.display()))?;
+    Ok((taught, shown))
 }
 
 /// One output picture per searched one, next to the list; numbered if there are several.
@@ -300,17 +387,19 @@ fn listed(m: Match, options: &SearchOptions, cells: f64, mm_per_px: Option<f64>)
         edges: m.edges,
         edge_rms_px: m.edge_rms_px,
         second_score: m.second_score,
+        correlation: m.correlation,
         warning: m.warning,
     }
 }
 
 fn table(all: &[Found]) -> String {
-    let mut s =
-        String::from("picture,number,x_px,y_px,angle_deg,scale,score,sigma_x_px,sigma_y_px,sigma_deg,sigma_scale\n");
+    let mut s = String::from(
+        "picture,number,x_px,y_px,angle_deg,scale,score,sigma_x_px,sigma_y_px,sigma_deg,sigma_scale,correlation\n",
+    );
     for f in all {
         for (k, m) in f.matches.iter().enumerate() {
             s += &format!(
-                "\"{}\",{},{:.4},{:.4},{:.4},{:.5},{:.4},{:.4},{:.4},{:.4},{:.5}\n",
+                "\"{}\",{},{:.4},{:.4},{:.4},{:.5},{:.4},{:.4},{:.4},{:.4},{:.5},{}\n",
                 f.picture.replace('"', "\"\""),
                 k + 1,
                 m.x_px,
@@ -321,7 +410,8 @@ fn table(all: &[Found]) -> String {
                 m.sigma_px[0],
                 m.sigma_px[1],
                 m.sigma_deg,
-                m.sigma_scale
+                m.sigma_scale,
+                m.correlation.map_or(String::new(), |c| format!("{c:.4}"))
             );
         }
     }
@@ -342,14 +432,15 @@ fn summary(all: &[Found]) -> String {
         );
         for (k, m) in f.matches.iter().enumerate() {
             s += &format!(
-                "{:4}  {:9.3} {:9.3} px  {:8.3} degrees  scale {:.4}  score {:.3}  sigma {:.3} {:.3} px, {:.3} \
-                 degrees{}\n",
+                "{:4}  {:9.3} {:9.3} px  {:8.3} degrees  scale {:.4}  score {:.3}  correlation {}  sigma {:.3} \
+                 {:.3} px, {:.3} degrees{}\n",
                 k + 1,
                 m.x_px,
                 m.y_px,
                 m.angle_deg,
                 m.scale,
                 m.score,
+                m.correlation.map_or("none".into(), |c| format!("{c:.3}")),
                 m.sigma_px[0],
                 m.sigma_px[1],
                 m.sigma_deg,
