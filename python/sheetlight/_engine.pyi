@@ -61,6 +61,7 @@ class _Match(TypedDict):
     edges: int
     edge_rms_px: float
     second_score: float
+    correlation: float | None
     warning: str | None
 
 @final
@@ -313,6 +314,7 @@ def match_template(
     angles_deg: Sequence[float] | None = None,
     scales: Sequence[float] | None = None,
     min_score: float | None = None,
+    weak_score: float | None = None,
     most: int = 1,
     max_overlap: float | None = None,
     ignore_polarity: bool = False,

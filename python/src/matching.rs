@@ -5,7 +5,7 @@ use crate::fault::{OrRaise, raised};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use sheetlight::fault::Fault;
-use sheetlight::find::{self, Accelerator, Area, ModelOptions, Scene, SearchOptions, find_in};
+use sheetlight::find::{self, Accelerator, Area, ModelOptions, Scene, SearchOptions, Weak, find_taught};
 use sheetlight::raster::{Image, Pixels};
 use sheetlight::rig::hash_text;
 use std::path::PathBuf;
@@ -70,12 +70,13 @@ fn hash_of(image: &Image) -> String {
 
 /// Finds a template in a picture (rows x columns), best first: a list of dicts with x_px, y_px (of the middle of its
 /// region), angle_deg (x towards y), scale, score, sigma_px (2), sigma_deg, sigma_scale, edges, edge_rms_px,
-/// second_score and warning. Nothing found is an empty list.
+/// second_score, correlation (of the grey levels, -1 to 1, or None) and warning. Nothing found is an empty list.
 ///
+/// `weak_score` is the least score of matches whose correlation is 0.8 or more: 0.4 unless `min_score` is given.
 /// `region` is (x, y, width, height) in px in which the middle lies. Raises SheetlightError for options out of range.
 #[pyfunction]
-#[pyo3(signature = (template, picture, *, angles_deg = None, scales = None, min_score = None, most = 1,
-    max_overlap = None, ignore_polarity = false, region = None, bits = None))]
+#[pyo3(signature = (template, picture, *, angles_deg = None, scales = None, min_score = None, weak_score = None,
+    most = 1, max_overlap = None, ignore_polarity = false, region = None, bits = None))]
 pub fn match_template<'py>(
     py: Python<'py>,
     template: &Template,
@@ -83,6 +84,7 @@ pub fn match_template<'py>(
     angles_deg: Option<[f64; 2]>,
     scales: Option<[f64; 2]>,
     min_score: Option<f64>,
+    weak_score: Option<f64>,
     most: usize,
     max_overlap: Option<f64>,
     ignore_polarity: bool,
@@ -100,10 +102,14 @@ pub fn match_template<'py>(
         ..usual.at_most(most)
     };
     options.check().or_raise()?;
+    let usual = Weak::default();
+    let weak_score = weak_score.or_else(|| min_score.is_none().then_some(usual.min_score));
+    let weak = weak_score.map(|min_score| Weak { min_score, ..usual });
     let area = region.map(Area::rectangle).transpose().or_raise()?;
     let matches = py.detach(|| {
         let accelerator = Accelerator::open();
-        find_in(&Scene::from_image(&image), &template.0.model, &options, area.as_ref(), accelerator.as_ref())
+        let scene = Scene::from_image(&image);
+        find_taught(&scene, &template.0, &options, weak.as_ref(), area.as_ref(), accelerator.as_ref())
     });
     let all = PyList::empty(py);
     for m in matches.or_raise()? {
@@ -119,6 +125,7 @@ pub fn match_template<'py>(
         one.set_item("edges", m.edges)?;
         one.set_item("edge_rms_px", m.edge_rms_px)?;
         one.set_item("second_score", m.second_score)?;
+        one.set_item("correlation", m.correlation)?;
         one.set_item("warning", m.warning)?;
         all.append(one)?;
     }

@@ -75,7 +75,7 @@ def test_a_template_is_matched_to_a_fraction_of_a_pixel():
     picture = shape(300, 400, 85.3, 50.7)
     best = sheetlight.match_template(template, picture, angles_deg=(-5, 5))[0]
     assert abs(best["x_px"] - 109.8) < 0.1 and abs(best["y_px"] - 80.2) < 0.1
-    assert abs(best["angle_deg"]) < 0.2 and best["score"] > 0.95
+    assert abs(best["angle_deg"]) < 0.2 and best["score"] > 0.95 and best["correlation"] > 0.95
     assert sheetlight.match_template(template, np.full((300, 400), 40, np.uint8)) == []
     with pytest.raises(SheetlightError, match="min_score"):
         sheetlight.match_template(template, picture, min_score=7.0)
