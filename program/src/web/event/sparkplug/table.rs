@@ -234,7 +234,7 @@ mod tests {
     fn figures_of_the_bar_keep_their_units() {
         let bar = json!({
             "robot": "armed", "laser": null, "frames": {"seen": 7, "dropped": {"dark": 2, "late": 1}},
-            "delay_ms": [1.26, 9.0], "calibration": {"days": 3.14159, "expected_mm": null}, "disk_left_gb": 12.345678,
+            "delay_ms": [1.26, 9.0], "calibration": {"days": 3.123456, "expected_mm": null}, "disk_left_gb": 12.345678,
             "memory_mb": [123.4, 200.0], "alarms": ["one", "two"],
         });
         let seen = Seen { bar, rate_hz: Some(29.97), ..Seen::default() };
