@@ -36,7 +36,8 @@ pub fn cover(distance: f64) -> f64 {
 
 /// Strokes of print on a bracket, which differ from specimen to specimen: place and turn in its frame.
 fn strokes(rng: &mut Pcg64) -> Vec<[f64; 3]> {
-    let mut one = || [rng.random_range(-30.0..30.0), rng.random_range(-14.0..14.0), rng.random_range(0.0..3.14)];
+    let mut one =
+        || [rng.random_range(-30.0..30.0), rng.random_range(-14.0..14.0), rng.random_range(0.0..std::f64::consts::PI)];
     (0..32).map(|_| one()).collect()
 }
 

@@ -92,7 +92,7 @@ fn a_mask_of_the_picture_or_of_its_region_excludes_edges_and_levels() {
         at(name)
     };
     // Of the region the part from column 149 on counts, its right 60 px.
-    let whole = save("whole.png", 320, 256, &|x, y| x >= 149 || x < 112 || !(88..169).contains(&y));
+    let whole = save("whole.png", 320, 256, &|x, y| !(112..149).contains(&x) || !(88..169).contains(&y));
     let own = save("own.png", 97, 81, &|x, _| x >= 37);
     let other = save("other.png", 97, 80, &|_, _| true);
     let teach = |mask: &Path| {
