@@ -6,7 +6,7 @@ use super::listing::{self, HEADER_WORDS};
 use super::peak::across::{centre, direction, turn};
 use super::peak::found::{REASON, Reject, SATURATED};
 use super::peak::{fit, methods, scoring, windows};
-use super::stripe::{point, skeleton, spacing};
+use super::stripe::{optics, skeleton, spacing};
 use super::{grid, support};
 
 /// The shader that states it (empty: a shared text), its name there, its value in Rust.
@@ -53,7 +53,7 @@ pub const NUMBERS: &[(&str, &str, f64)] = &[
     ("peak", "TWO", turn::EVEN_ROW[1] as f64),
     ("peak", "FAR", turn::EVEN_ROW[0] as f64),
     ("peak", "NONE", turn::MIDDLE_ROW[1] as f64),
-    ("point", "NEWTON", point::NEWTON as f64),
+    ("point", "NEWTON", optics::NEWTON as f64),
     ("spacing", "FAR", spacing::FAR as f64),
     ("spacing", "NEAR", spacing::NEAR as f64),
     ("spacing", "COMPANY", spacing::COMPANY as f64),

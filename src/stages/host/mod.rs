@@ -118,11 +118,12 @@ impl Host {
             let mut peaks = peak::fitted(image, &pixels, shot, frame, m.peak.method);
             let mut strongest = vec![0u32; frame.lines as usize];
             peaks.iter_mut().for_each(|k| choose::alone(k, frame, &mut strongest));
-            let point = |k: &mut Peak| {
-                choose::beside(k, &strongest, lines);
-                point::one(k, &m.optics, pose)
+            let mut points = vec![Point::NONE; peaks.len()];
+            let some = |(peaks, points): (&mut [Peak], &mut [Point])| {
+                peaks.iter_mut().for_each(|k| choose::beside(k, &strongest, lines));
+                point::put(peaks, &m.optics, pose, points);
             };
-            let points = peaks.par_iter_mut().with_min_len(peak::TOGETHER).map(point).collect();
+            peaks.par_chunks_mut(peak::TOGETHER).zip(points.par_chunks_mut(peak::TOGETHER)).for_each(some);
             Found { pixels, peaks, points }
         })
     }

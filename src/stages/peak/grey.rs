@@ -10,6 +10,12 @@ pub(crate) trait Grey: Copy + Sync {
     fn is(&self, other: &Self) -> bool;
     /// The level of a pixel by its number, row by row.
     fn stored(&self, number: i32) -> i32;
+    /// Four neighbours in a row, as they are stored.
+    type Four: Copy;
+    /// Those from a pixel on, by its number.
+    fn four(&self, number: i32) -> Self::Four;
+    /// The level of one of them, 0..4.
+    fn of_four(four: Self::Four, which: usize) -> i32;
 
     /// As `whole`.
     #[inline(always)]
@@ -41,7 +47,32 @@ pub(crate) struct View<'a, T> {
     pub(crate) height: i32,
 }
 
-impl<T: Copy + Sync + Into<i32>> Grey for View<'_, T> {
+/// A level as it is stored, and four of them in one word.
+pub(crate) trait Level: Copy + Sync + Into<i32> {
+    type Four: Copy;
+    fn four(levels: [Self; 4]) -> Self::Four;
+    fn of_four(four: Self::Four, which: usize) -> i32;
+}
+
+macro_rules! level {
+    ($($level:ty, $four:ty);*) => {$(
+        impl Level for $level {
+            type Four = $four;
+            /// The first one lies in the lowest bits. On most processors this is one load.
+            #[inline(always)]
+            fn four(levels: [Self; 4]) -> $four {
+                (0..4).fold(0, |four, i| four | <$four>::from(levels[i]) << (<$level>::BITS * i as u32))
+            }
+            #[inline(always)]
+            fn of_four(four: $four, which: usize) -> i32 {
+                i32::from((four >> (<$level>::BITS * which as u32)) as $level)
+            }
+        }
+    )*};
+}
+level!(u8, u32; u16, u64);
+
+impl<T: Level> Grey for View<'_, T> {
     #[inline(always)]
     fn inside(&self, x: i32, y: i32) -> i32 {
         self.pixels[(y * self.width + x) as usize].into()
@@ -57,6 +88,16 @@ impl<T: Copy + Sync + Into<i32>> Grey for View<'_, T> {
     #[inline(always)]
     fn stored(&self, number: i32) -> i32 {
         self.pixels[number as usize].into()
+    }
+    type Four = T::Four;
+    #[inline(always)]
+    fn four(&self, number: i32) -> T::Four {
+        let from = &self.pixels[number as usize..];
+        T::four(*from.first_chunk().expect("four pixels in the picture"))
+    }
+    #[inline(always)]
+    fn of_four(four: T::Four, which: usize) -> i32 {
+        T::of_four(four, which)
     }
 }
 
@@ -80,5 +121,14 @@ impl<G: Grey> Grey for Inner<G> {
     #[inline(always)]
     fn stored(&self, number: i32) -> i32 {
         self.0.stored(number)
+    }
+    type Four = G::Four;
+    #[inline(always)]
+    fn four(&self, number: i32) -> G::Four {
+        self.0.four(number)
+    }
+    #[inline(always)]
+    fn of_four(four: G::Four, which: usize) -> i32 {
+        G::of_four(four, which)
     }
 }

@@ -5,12 +5,12 @@ use std::array::from_fn;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// As many as a vector register of most processors holds. If it holds fewer, two registers take turns.
-pub(super) const LANES: usize = 8;
+pub(in crate::stages) const LANES: usize = 8;
 
 /// One number for each fit.
 #[derive(Clone, Copy)]
 #[repr(align(32))]
-pub(super) struct Lanes(pub [f32; LANES]);
+pub(in crate::stages) struct Lanes(pub [f32; LANES]);
 
 impl Lanes {
     pub const ZERO: Lanes = Lanes::all(0.0);
@@ -63,7 +63,7 @@ fn bits(whole: f32) -> u32 {
 /// One whole number for each fit.
 #[derive(Clone, Copy)]
 #[repr(align(32))]
-pub(super) struct Whole(pub [i32; LANES]);
+pub(in crate::stages) struct Whole(pub [i32; LANES]);
 
 impl Whole {
     pub const ZERO: Whole = Whole::all(0);
@@ -128,7 +128,7 @@ impl Neg for Lanes {
 /// e to the power of x from -80 to 80, with a relative error of 2e-7. Every machine has its own `exp`; this one is the
 /// shader's.
 #[inline(always)]
-pub(super) fn exponential(x: Lanes) -> Lanes {
+pub(in crate::stages) fn exponential(x: Lanes) -> Lanes {
     let t = (x * Lanes::all(std::f32::consts::LOG2_E)).clamp(Lanes::all(-120.0), Lanes::all(120.0));
     let whole = (t + Lanes::all(0.5)).map(f32::floor);
     let f = t - whole;

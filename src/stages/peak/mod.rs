@@ -7,7 +7,7 @@ pub(in crate::stages) mod fit;
 pub mod found;
 pub mod frame;
 pub mod grey;
-mod lanes;
+pub(in crate::stages) mod lanes;
 mod measure;
 pub(in crate::stages) mod methods;
 mod noise;

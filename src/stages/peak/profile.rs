@@ -6,7 +6,7 @@ use super::PeakFrame;
 use super::grey::Grey;
 use super::lanes::{LANES, Lanes};
 use super::params::SAMPLES;
-use super::windows::{Column, Gathered, Seen, WEIGHT, Windows, by_columns, lean};
+use super::windows::{Gathered, Seen, Still, WEIGHT, Windows, by_columns, lean};
 use std::array::from_fn;
 
 /// The stripe's light over the offset across it: one profile in each lane, independent of the others. Sample k lies at
@@ -37,7 +37,7 @@ pub(super) struct Profiles {
     pub base: Lanes,
     pub uneven2: Lanes,
     /// Memory reused from one profile to the next.
-    columns: Vec<Column>,
+    still: Still,
 }
 
 /// Place in the picture of a centre that is `m` px across from a pixel: the middle of the window there. It is on the
@@ -135,7 +135,7 @@ impl Profiles {
             blur2: zero,
             base: zero,
             uneven2: zero,
-            columns: Vec::new(),
+            still: Still::default(),
         }
     }
 
@@ -144,7 +144,7 @@ impl Profiles {
     #[inline(always)]
     pub fn put<G: Grey, const INNER: bool>(&mut self, images: [G; LANES], seen: &[Seen; LANES], s: &PeakFrame) {
         let windows = Windows::new(images, seen, s);
-        let alike = windows.alike(&mut self.columns);
+        let alike = windows.alike::<INNER>(&mut self.still);
         let step = windows.step();
         let mut off = Off::NONE;
         let (mut low, mut high) = (Lanes::ZERO, Lanes::ZERO);
@@ -152,7 +152,7 @@ impl Profiles {
         for (side, j) in (0..2).flat_map(|side| (0..half).map(move |j| (side, j))) {
             let k = number(side, j);
             let sample = match &alike {
-                Some(alike) => windows.still::<INNER>(k as i32, &self.columns, alike),
+                Some(alike) => windows.still::<INNER>(k as i32, &self.still, alike),
                 None => windows.sample::<INNER>(k as i32),
             };
             let scale = 1.0 / sample.weight.float();

@@ -80,6 +80,15 @@ impl Grey for Packed<'_> {
     fn stored(&self, number: i32) -> i32 {
         self.inside(number % self.width, number / self.width)
     }
+    type Four = [i32; 4];
+    #[inline(always)]
+    fn four(&self, number: i32) -> [i32; 4] {
+        std::array::from_fn(|i| self.stored(number + i as i32))
+    }
+    #[inline(always)]
+    fn of_four(four: [i32; 4], which: usize) -> i32 {
+        four[which]
+    }
 }
 
 /// CPU twin: the peaks of all pixels of a batch.

@@ -95,6 +95,23 @@ pub(super) struct Column {
     weight: Whole,
 }
 
+/// Four neighbouring columns of each window that share their shift, so that their pixels in a line are neighbours in
+/// the picture.
+#[derive(Clone, Copy)]
+pub(super) struct Four {
+    /// Number of the first column's pixel in line 0.
+    at: Whole,
+    weights: [Whole; 4],
+}
+
+/// The columns of windows that do not move: all, those that are read four at a time, and the others.
+#[derive(Default)]
+pub(super) struct Still {
+    all: Vec<Column>,
+    fours: Vec<Four>,
+    single: Vec<Column>,
+}
+
 /// Weighted sums over the pixels of a sample.
 #[derive(Clone, Copy)]
 pub(super) struct Gathered {
@@ -131,6 +148,12 @@ impl Gathered {
     #[inline(always)]
     fn light(&mut self, g: Whole, level: Whole, full_scale: i32) {
         self.levels = self.levels + g * level;
+        self.clip(g, level, full_scale);
+    }
+
+    /// Adds the weight of pixels that are clipped.
+    #[inline(always)]
+    fn clip(&mut self, g: Whole, level: Whole, full_scale: i32) {
         self.clipped = self.clipped + g.with(level, |g, level| if level >= full_scale { g } else { 0 });
     }
 }
@@ -256,27 +279,65 @@ impl<G: Grey> Windows<G> {
     }
 
     /// The sums that all samples of windows that do not move have in common: all except their light. Their columns are
-    /// the same for all samples. None if a window moves.
+    /// the same for all samples. None if a window moves. With `INNER`, pixels beside the windows lie in the picture,
+    /// too.
     #[inline(always)]
-    pub fn alike(&self, columns: &mut Vec<Column>) -> Option<Gathered> {
+    pub fn alike<const INNER: bool>(&self, still: &mut Still) -> Option<Gathered> {
         if self.lean.0.iter().any(|&lean| lean != 0.0) {
             return None;
         }
-        columns.clear();
-        columns.extend((0..self.count).map(|c| self.column(c, (Lanes::ZERO, Whole::ZERO))));
+        let Still { all, fours, single } = still;
+        all.clear();
+        fours.clear();
+        single.clear();
+        // Columns beyond a window have no weight.
+        let whole = (self.count + 3) & !3;
+        all.extend((0..whole).map(|c| self.column(c, (Lanes::ZERO, Whole::ZERO))));
         let mut sums = Gathered::NONE;
         for row in 0..self.tall {
-            columns.iter().for_each(|column| sums.place(column.weight, self.across(column, row)));
+            all.iter().for_each(|column| sums.place(column.weight, self.across(column, row)));
+        }
+        let in_rows = INNER && self.columns == [true; LANES];
+        for four in all.chunks_exact(4) {
+            let shift = four[0].shift;
+            if in_rows && four.iter().all(|column| column.shift.0 == shift.0) {
+                let at = (self.a0 + four[0].i) + (self.b0 + shift) * self.stride.1;
+                fours.push(Four { at, weights: from_fn(|c| four[c].weight) });
+            } else {
+                single.extend(four.iter().filter(|column| column.weight.0 != [0; LANES]));
+            }
         }
         Some(sums)
     }
 
+    /// Visits weights and levels of the pixels of sample k that are read four at a time.
+    #[inline(always)]
+    fn by_fours(&self, k: i32, fours: &[Four], mut visit: impl FnMut(Whole, Whole)) {
+        for line in k * self.tall..(k + 1) * self.tall {
+            let down = Whole::all(line) * self.stride.1;
+            for Four { at, weights } in fours {
+                let four = (*at + down).0.map(|number| self.images[0].four(number));
+                for (c, &weight) in weights.iter().enumerate() {
+                    visit(weight, Whole(four.map(|four| G::of_four(four, c))));
+                }
+            }
+        }
+    }
+
     /// Sample k of windows that do not move: its light; all else is as in `alike`.
     #[inline(always)]
-    pub fn still<const INNER: bool>(&self, k: i32, columns: &[Column], alike: &Gathered) -> Gathered {
-        let mut sums = *alike;
+    pub fn still<const INNER: bool>(&self, k: i32, still: &Still, alike: &Gathered) -> Gathered {
+        let (mut sums, mut most) = (*alike, Whole::ZERO);
+        self.by_fours(k, &still.fours, |weight, level| {
+            sums.levels = sums.levels + weight * level;
+            most = most.with(level, i32::max);
+        });
+        // Few samples have clipped pixels.
+        if most.0.iter().any(|level| *level >= self.full_scale) {
+            self.by_fours(k, &still.fours, |weight, level| sums.clip(weight, level, self.full_scale));
+        }
         for line in k * self.tall..(k + 1) * self.tall {
-            for column in columns {
+            for column in &still.single {
                 sums.light(column.weight, self.levels::<INNER>(column, line), self.full_scale);
             }
         }

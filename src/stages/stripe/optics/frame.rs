@@ -1,9 +1,9 @@
 //! In: camera, laser plane, lines across the stripe. Out: the same in f32 for the stage that computes points, and its
 //! uniform block. Frame and unit: camera frame, px, mm; stated at each field.
 
-use super::choose::Lines;
 use crate::camera::{Distortion, Intrinsics};
 use crate::geometry::{Camera, Plane};
+use crate::stages::stripe::choose::Lines;
 use glam::{DVec3, Vec2, Vec3};
 
 /// Camera and laser plane in the stage's format: f32, in the camera frame.
@@ -38,7 +38,7 @@ impl Optics {
     pub fn plain(&self) -> bool {
         self.distortion[5..].iter().all(|t| *t == 0.0) && self.untilt == FLAT
     }
-    /// The value of the override [`super::point::FULL_LENS`].
+    /// The value of the override [`crate::stages::stripe::point::FULL_LENS`].
     pub fn full_lens(&self) -> f64 {
         f64::from(u8::from(!self.plain()))
     }
