@@ -258,7 +258,8 @@ mod tests {
         assert_eq!((record.kind(), record.camera()), (Kind::LaserPlane, Some(&*camera.content())));
         Rig::store(dir.path(), &camera, None).unwrap();
         Rig::store(dir.path(), record.as_ref(), None).unwrap();
-        assert_eq!(Rig::load(dir.path()).unwrap().need_laser_plane().unwrap().value.offset, 70.0);
+        let stored = Rig::load(dir.path()).unwrap().laser_plane.unwrap();
+        assert_eq!(stored.value, plane(70.0, &camera).value);
         assert!(Rig::record(&text.replace("laser_plane", "turntable")).is_err());
         assert!(Rig::record("{}").is_err());
     }

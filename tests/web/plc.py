@@ -292,13 +292,13 @@ def last(s):
     return s.json("GET", "/jobs")[0]
 
 
-def cut(name, frames, to):
-    """A copy of a recording with its first frames, begun now."""
+def cut(name, frames, to, times=1):
+    """A copy of a recording with its first frames, some times over, begun now."""
     copy = shutil.copytree(os.path.join(recorded, name), os.path.join(recorded, to))
     path = os.path.join(copy, "meta.json")
     with open(path) as f:
         meta = json.load(f)
-    meta["frames"] = meta["frames"][:frames]
+    meta["frames"] = meta["frames"][:frames] * times
     with open(path, "w") as f:
         json.dump(meta, f)
 
@@ -311,9 +311,6 @@ def made(s, plc, *request):
     assert error == 0, (error, said)
     # Taken at once, not when it has begun.
     assert plc.made().recording == last(s)["order"]["recording"], plc.made()
-    for other in ([SCAN], [CALIBRATE, CAMERA]):
-        error, said, _ = plc.ask(*other)
-        assert error == 6 and f"{last(s)['id']} runs or waits" in said, (other, error, said)
     job = until("its end", lambda: (lambda j: j if j.ended > ended else None)(plc.job()), 5 * PATIENCE)
     stored, of = last(s), plc.made()
     assert job.number == int(stored["id"].split("-")[0]) and (job.procedure, job.step, job.asks) == (request[0], "", ""), job
@@ -353,6 +350,14 @@ def scanned(s, plc):
         refused(s, plc, 1, f"register 2 is {target}, 1 to 5 are camera", CALIBRATE, target)
     plc.recipe("")
     refused(s, plc, 4, "no complete recording of boards", CALIBRATE, AXIS)
+    # While a job runs, no other one is taken.
+    cut("scan", None, "a-long-one", 100)
+    runs = s.json("POST", "/jobs", {"procedure": "scan", "recording": "a-long-one"})["id"]
+    for other in ([SCAN], [CALIBRATE, CAMERA]):
+        error, said, _ = plc.ask(*other)
+        assert error == 6 and f"{runs} runs or waits" in said, (other, error, said)
+    s.json("POST", f"/jobs/{runs}/stop")
+    s.ended(runs)
     cut("scan", 20, "a-newer-one")
     cut("intrinsics", 5, "boards")
     cut("intrinsics", 2, "few")
