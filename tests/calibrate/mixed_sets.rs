@@ -106,7 +106,10 @@ fn pictures_that_were_read_out_otherwise_are_named() {
         let (text, named, off) = said(pictures, &s);
         exact += usize::from(named == which || 2 * which.len() == s.poses.len());
         // Refused, or the pictures left out.
-        let told = text.contains("not of the camera") || named == which;
+        let told = text.contains("do not fit the other pictures' camera") || named == which;
+        // Where nearly half of the pictures are others, nobody knows which half is right.
+        let turned = text.contains("pictures do not fit") && named.iter().any(|i| !which.contains(i));
+        assert!(!turned || text.contains("or the others were"), "{k}: {which:?}, named {named:?}: {text}");
         // A small change of a few pictures that tell little of it: the camera is as good as it says all the same.
         harmless += usize::from(!told && off < 3.0);
         if !told && off >= 3.0 {
