@@ -291,8 +291,7 @@ mod tests {
         assert_eq!((requests.load(SeqCst), connections.load(SeqCst)), (1, 2));
     }
 
-    /// A station whose program is older is told nothing that it would take for something else: there SCAN was refused,
-    /// and registers behind the words of the error did not exist.
+    /// An older program of a station refuses SCAN and has no registers behind the error's words. Nothing is sent to it.
     #[tokio::test]
     async fn a_station_without_registers_for_scans_is_not_asked_for_one() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();

@@ -76,7 +76,7 @@ impl Target {
 /// Verdict of a calibration, by its number in the registers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Verdict {
-    /// There is none yet, or this program does not know it.
+    /// No calibration has ended, or the station states a verdict that this program does not know.
     #[default]
     None,
     Good,

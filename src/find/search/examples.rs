@@ -37,7 +37,8 @@ const MOST: usize = 50;
 /// Least mean cosine between an edge of the first example and the others there. A single direction by chance passes
 /// with 0.3, the mean of two with 0.1.
 const AGREE: f64 = 0.6;
-/// So many times as many edge points are taught as the model keeps, so that print does not take the outline's places.
+/// Edge points that are taught, as a multiple of those that the model keeps. Print that drops out later then takes no
+/// place of the outline.
 const SPARE: usize = 4;
 /// A level varies where an example differs from the mean by more than this many sigmas.
 const SIGMAS: f32 = 4.0;

@@ -49,8 +49,8 @@ pub fn posed(peaks: &mut [Peak], optics: &Optics, pose: &[f32; 12]) -> Vec<Point
     points
 }
 
-/// Puts the points of peaks, as many of both, where there is none yet. Compiled for several instruction sets; all of
-/// them round in the same way.
+/// Writes each peak's point to its place in `points`, which holds [`Point::NONE`] before. Compiled for several
+/// instruction sets; all of them round in the same way.
 #[multiversion(targets = "simd")]
 pub(in crate::stages) fn put(peaks: &mut [Peak], optics: &Optics, pose: &[f32; 12], points: &mut [Point]) {
     let row = |i: usize, [x, y, z]: [Lanes; 3]| {

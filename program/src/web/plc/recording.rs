@@ -47,7 +47,7 @@ pub(super) fn of_target(r: &RecordingInfo, target: Target) -> bool {
 /// The named recording, or the newest one that suits; `what` says which is wanted.
 ///
 /// # Errors
-/// The name is none, leads out of the folder, or nothing has it; there is no recording that suits.
+/// The name is invalid, leads out of the folder, or names no recording. Without a name: no recording suits.
 pub(super) fn taken(
     place: &Place,
     name: Option<String>,

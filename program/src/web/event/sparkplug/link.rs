@@ -50,7 +50,7 @@ impl<J: Fn() -> Vec<Job>, R: Fn() -> Option<f64>> Source<J, R> {
         Some(told)
     }
 
-    /// Takes events that nobody is told of now. Returns when there will be no more.
+    /// Reads events while no connection publishes them. Returns at the end of the events.
     async fn watch(&self, events: &mut Receiver<Arc<str>>, seen: &mut Seen) {
         while self.next(events, seen).await.is_some() {}
     }
