@@ -133,8 +133,6 @@ cause: string,
  */
 next: string, };
 
-export type Target = "camera" | "hand_eye" | "laser_plane" | "pointer" | "axis";
-
 export type TeachOrder = { 
 /**
  * The job that scanned it.
@@ -181,23 +179,39 @@ export type Plain = Record<string, never>;
 
 export type ScanOrder = { 
 /**
- * Path of the recording.
+ * Recording folder with meta.json
  */
 recording: string, 
 /**
- * Cell size of the map, mm; null: chosen from the points' density.
+ * Pose file of the recording, without extension [default: the one in meta.json]
  */
-cell_mm?: number | null, 
+poses?: string | null, 
 /**
- * auto, gpu or cpu; null: auto.
+ * Channel of a colour picture: red, green, blue or luma
+ */
+channel?: string | null, 
+/**
+ * Picture with the laser off at the shots' exposure, to subtract: in the recording, or a path; once per exposure
+ */
+ambient?: Array<string> | null, 
+/**
+ * Use exposure N of a recording with several, 1 is the shortest, instead of merging all
+ */
+exposure?: number | null, 
+/**
+ * Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
  */
 on?: string | null, 
 /**
- * Skip shots that cannot be read.
+ * Cell of the height map, mm [default: about 1.5 points per cell]
+ */
+cell_mm?: number | null, 
+/**
+ * Exclude shots that cannot be read, and list them
  */
 skip_bad: boolean, 
 /**
- * Settings that differ from the station's: dotted keys of [extraction] in station.toml, and their values.
+ * Settings that differ from the station's: dotted keys of [extraction] in station.toml, and their values
  */
 settings: Record<string, unknown>, };
 
@@ -278,29 +292,187 @@ pins?: [[number, number], [number, number]] | null, };
 
 export type TouchOrder = { 
 /**
- * Path of the recording of the pointer.
- */
-recording: string, };
-
-export type CalibrateOrder = { 
-/**
- * What to calibrate.
- */
-target: Target, 
-/**
- * Path of the recording.
+ * Recording with a laser picture of the pointer's spot per frame
  */
 recording: string, 
 /**
- * Frames to exclude, counted from 0.
+ * Pose file of the recording, without extension [default: the one in meta.json]
  */
-leave_out: Array<number>, };
+poses?: string | null, };
+
+export type CameraOrder = { 
+/**
+ * Recording of a board
+ */
+recording: string, 
+/**
+ * Further recordings of the same camera, also of other boards
+ */
+more: Array<string>, 
+/**
+ * Frames that are not used, counted from 0 over all recordings
+ */
+leave_out: Array<number>, 
+/**
+ * Lens terms: evidence (what the pictures determine), none, one (k1), four (k1 k2 p1 p2), five (k3 too),
+ * rational (and k4 k5 k6), prism (five and s1..s4), scheimpflug (k1 k2 k3 and tilt), all (OpenCV's 14)
+ */
+lens?: string | null, 
+/**
+ * Estimate the skew too; sensors with square rows have none
+ */
+skew: boolean, 
+/**
+ * Shape of the board: evidence (estimated if 8 or more pictures determine it), drawn (as drawn), shaped (always
+ * estimated)
+ */
+board?: string | null, 
+/**
+ * Distance at which the expected error is judged, mm [default: middle of the working volume, else of the boards]
+ */
+working_mm?: number | null, 
+/**
+ * Channel of a colour picture: red, green, blue or luma
+ */
+channel?: string | null, };
+
+export type HandEyeOrder = { 
+/**
+ * Recording of one board that stands still, or is carried by the flange, with a picture and a pose per frame
+ */
+recording?: string | null, 
+/**
+ * Frames that are not used, counted from 0
+ */
+leave_out: Array<number>, 
+/**
+ * Pose file of the recording, without extension [default: the one in meta.json]; with board poses a path
+ */
+poses?: string | null, 
+/**
+ * Board poses (camera_T_board, docs/file-formats.md) instead of pictures
+ */
+board_poses?: string | null, 
+/**
+ * Sigma of the board poses' position per axis, mm [default: included in the robot's]
+ */
+board_sigma_mm?: number | null, 
+/**
+ * Sigma of the board poses' orientation per axis, degrees
+ */
+board_sigma_deg?: number | null, 
+/**
+ * Where the camera is: eye-in-hand (on the flange) or eye-to-hand (fixed) [default: the station's, else
+ * eye-in-hand with a note]
+ */
+mount?: string | null, 
+/**
+ * Sigma of the robot's position per axis, mm [default: estimated]
+ */
+robot_sigma_mm?: number | null, 
+/**
+ * Sigma of the robot's orientation per axis, degrees [default: estimated]
+ */
+robot_sigma_deg?: number | null, 
+/**
+ * Distance at which the expected error is stated, mm [default: middle of the working volume, else of the boards]
+ */
+working_mm?: number | null, 
+/**
+ * Channel of a colour picture: red, green, blue or luma
+ */
+channel?: string | null, };
+
+export type LaserPlaneOrder = { 
+/**
+ * Recording with an ambient and a laser picture per frame
+ */
+recording: string, 
+/**
+ * Frames that are not used, counted from 0
+ */
+leave_out: Array<number>, 
+/**
+ * Nearest depth at which the result is judged, mm [default: station.toml's, else where boards were lit]
+ */
+near_mm?: number | null, 
+/**
+ * Farthest depth at which the result is judged, mm
+ */
+far_mm?: number | null, 
+/**
+ * Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
+ */
+on?: string | null, 
+/**
+ * Channel of a colour picture: red, green, blue or luma
+ */
+channel?: string | null, };
+
+export type PointerOrder = { 
+/**
+ * Recording with an ambient and a laser picture per frame
+ */
+recording: string, 
+/**
+ * Frames that are not used, counted from 0
+ */
+leave_out: Array<number>, 
+/**
+ * Nearest depth at which the result is judged, mm [default: station.toml's, else where spots were]
+ */
+near_mm?: number | null, 
+/**
+ * Farthest depth at which the result is judged, mm
+ */
+far_mm?: number | null, 
+/**
+ * Channel of a colour picture: red, green, blue or luma
+ */
+channel?: string | null, };
+
+export type AxisOrder = { 
+/**
+ * Recording of a board on the axis, with a picture and a count per frame
+ */
+recording: string, 
+/**
+ * Frames that are not used, counted from 0
+ */
+leave_out: Array<number>, 
+/**
+ * Channel of a colour picture: red, green, blue or luma
+ */
+channel?: string | null, };
+
+export type CalibrateOrder = { "target": "camera" } & CameraOrder | { "target": "hand_eye" } & HandEyeOrder | { "target": "laser_plane" } & LaserPlaneOrder | { "target": "pointer" } & PointerOrder | { "target": "axis" } & AxisOrder;
 
 export type JointOrder = { 
 /**
- * Recordings of boards.
+ * Recordings of boards
  */
-recordings: Array<string>, };
+recordings: Array<string>, 
+/**
+ * Pose file of the recordings with robot poses, without extension [default: the one in meta.json]
+ */
+poses?: string | null, 
+/**
+ * Where the camera is: eye-in-hand (on the flange) or eye-to-hand (fixed) [default: the station's, else
+ * eye-in-hand with a note]
+ */
+mount?: string | null, 
+/**
+ * Nearest and farthest depth of the stated error, mm [default: the working volume, else where boards were lit]
+ */
+working_mm?: Array<number> | null, 
+/**
+ * Channel of a colour picture: red, green, blue or luma
+ */
+channel?: string | null, 
+/**
+ * Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
+ */
+on?: string | null, };
 
 export type AutoOrder = { 
 /**
@@ -1388,6 +1560,10 @@ board: boolean,
  * robot, linear or turntable.
  */
 motion: string, 
+/**
+ * The procedures that it suits: scan, touch, joint, or targets of a calibration.
+ */
+suits: Array<string>, 
 /**
  * Why it cannot be used; null: it can.
  */

@@ -4,6 +4,7 @@
 
 mod common;
 
+use common::copied;
 use std::path::Path;
 use std::process::Command;
 
@@ -24,14 +25,6 @@ const LINES: [[&str; 3]; 3] = [
 ];
 /// Of tests/data/added_stage, and where they go.
 const FILES: [[&str; 2]; 2] = [["border.wgsl", "shaders"], ["border.rs", "src/stages/stripe"]];
-
-fn copied(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).unwrap();
-    for entry in std::fs::read_dir(from).unwrap().map(Result::unwrap) {
-        let (path, to) = (entry.path(), to.join(entry.file_name()));
-        if path.is_dir() { copied(&path, &to) } else { std::fs::copy(&path, &to).map(|_| ()).unwrap() }
-    }
-}
 
 #[test]
 fn a_stage_is_two_files_and_a_line() {

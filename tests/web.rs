@@ -5,7 +5,7 @@
 mod common;
 
 use common::sheetlight;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
@@ -276,6 +276,32 @@ fn every_text_has_its_translations() {
         missing.extend(words.into_iter().filter(|w| !rows.contains_key(w)).map(|w| format!("{}: {w}", path.display())));
     }
     assert!(missing.is_empty(), "{missing:#?}");
+}
+
+/// Each plain input of a calibration has a field on the page, whose name is in the table, too.
+#[test]
+fn every_input_of_a_calibration_has_a_field() {
+    // The page asks for these itself; poses of boards are files of another program, which the command line takes.
+    let apart = ["procedure", "target", "recording", "board_poses", "board_sigma_mm", "board_sigma_deg"];
+    let description = sheetlight_program::web::openapi();
+    let schemas = description["components"]["schemas"].as_object().unwrap();
+    let orders = schemas.iter().filter(|(name, _)| name.starts_with("OrderCalibrate") || *name == "OrderJoint");
+    let inputs: BTreeSet<&str> = orders
+        .filter_map(|(_, schema)| schema["properties"].as_object())
+        .flatten()
+        .filter(|(name, input)| input["type"] != "array" && !apart.contains(&name.as_str()))
+        .filter(|(_, input)| !input["type"].as_array().is_some_and(|kinds| kinds.contains(&"array".into())))
+        .map(|(name, _)| name.as_str())
+        .collect();
+    let pages = source("program/src/web/pages");
+    let form = std::fs::read_to_string(pages.join("widgets/form.js")).unwrap();
+    let fields = form.split("export const FIELDS = {").nth(1).unwrap().split("};").next().unwrap();
+    let fields: BTreeMap<&str, &str> = fields.lines().filter_map(|line| line.trim().split_once(": ")).collect();
+    assert_eq!(fields.keys().copied().collect::<BTreeSet<_>>(), inputs);
+    let texts = std::fs::read_to_string(pages.join("base/texts.js")).unwrap();
+    let without: Vec<&&str> =
+        fields.values().filter(|words| !texts.contains(&format!("\n  {}:", words.trim_end_matches(',')))).collect();
+    assert!(without.is_empty(), "{without:?}");
 }
 
 #[test]

@@ -10,6 +10,8 @@ pub mod bench;
 pub mod cell;
 pub mod ros;
 
+pub mod procedure;
+
 pub mod web;
 
 pub mod cli;

@@ -74,6 +74,8 @@ pub trait Record {
     fn camera(&self) -> Option<&str>;
     /// The value as it stands in files.
     fn value(&self) -> Value;
+    /// The record as JSON, without a seal.
+    fn json(&self) -> Value;
     /// The text of its file.
     ///
     /// # Errors
@@ -104,6 +106,9 @@ impl<T: Serialize + Measured> Record for Calibration<T> {
     }
     fn value(&self) -> Value {
         serde_json::to_value(&self.value).expect("plain data")
+    }
+    fn json(&self) -> Value {
+        serde_json::to_value(self).expect("plain data")
     }
     fn text(&self) -> Result<String> {
         self.check(self.kind).map_err(|e| e.at(self.kind.words()))?;

@@ -371,7 +371,7 @@ fn brightest(image: &Image, mut pixels: Vec<u32>) -> Vec<u32> {
     pixels
 }
 
-/// Size in pixels of a block whose corners are examined first.
+/// Size in pixels of a block whose corners are examined first: as wide as a word of a mask.
 const BLOCK: (u32, u32) = (32, 16);
 /// Least distance of the corners' depths from a limit, as a share of the limit, for the whole block to lie on their
 /// side of it. Inverse depth is linear over the picture except for lens distortion, which within a block is far
@@ -409,17 +409,19 @@ fn region(format: Format, o: &Optical) -> Mask {
             None
         }
     };
-    let bands: Vec<Mask> = (0..h.div_ceil(BLOCK.1))
-        .into_par_iter()
-        .map(|band| {
-            let top = band * BLOCK.1;
-            let blocks: Vec<Option<bool>> = (0..w.div_ceil(BLOCK.0)).map(|i| block(i * BLOCK.0, top)).collect();
-            Mask::from_fn(w, BLOCK.1.min(h - top), |x, y| {
-                blocks[(x / BLOCK.0) as usize].unwrap_or_else(|| inside(x, top + y))
-            })
+    let rows = |band: u32| {
+        let (top, bottom) = (band * BLOCK.1, ((band + 1) * BLOCK.1).min(h));
+        let blocks: Vec<Option<bool>> = (0..w.div_ceil(BLOCK.0)).map(|i| block(i * BLOCK.0, top)).collect();
+        let word = move |y: u32, left: u32, of_block: Option<bool>| {
+            let bits = (left..(left + BLOCK.0).min(w)).enumerate();
+            bits.fold(0, |word, (bit, x)| word | u32::from(of_block.unwrap_or_else(|| inside(x, y))) << bit)
+        };
+        (top..bottom).flat_map(move |y| {
+            let words = (0..).step_by(BLOCK.0 as usize).zip(blocks.clone());
+            words.map(move |(left, of_block)| word(y, left, of_block))
         })
-        .collect();
-    Mask { width: w, height: h, words: bands.into_iter().flat_map(|b| b.words).collect() }
+    };
+    Mask { width: w, height: h, words: (0..h.div_ceil(BLOCK.1)).into_par_iter().flat_map_iter(rows).collect() }
 }
 
 #[cfg(test)]

@@ -28,6 +28,15 @@ pub fn reference(test: &str) -> Option<PathBuf> {
     Some(path)
 }
 
+/// Copies a folder with everything in it.
+pub fn copied(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap().map(Result::unwrap) {
+        let (path, to) = (entry.path(), to.join(entry.file_name()));
+        if path.is_dir() { copied(&path, &to) } else { std::fs::copy(&path, &to).map(|_| ()).unwrap() }
+    }
+}
+
 /// An adapter. Without one the tests pass and say so, unless SHEETLIGHT_REQUIRE_GPU is set.
 pub fn device() -> Option<sheetlight::gpu::Device> {
     match sheetlight::gpu::Device::open() {

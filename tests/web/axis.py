@@ -45,9 +45,17 @@ def main():
             shown = float(b.run("return document.querySelector('[data-next]').dataset.next"))
             assert abs(shown - widest(counts)) <= 1, (shown, widest(counts))
             assert b.run("return document.querySelectorAll('[data-stops] rect.bar').length") == len(counts)
+            # What a field of the form says is in the order; a grey picture has the same levels in every channel.
+            field = "document.querySelector('[data-input=channel] select')"
+            b.until("the form", f"return {field}")
+            assert b.run("return [...document.querySelectorAll('[data-input]')].map((e) => e.dataset.input)") == ["channel"]
+            assert b.run(f"return [...{field}.options].map((o) => o.text)") == ["luma", "red", "green", "blue"]
+            b.run(f"{field}.value = 'green'; {field}.dispatchEvent(new Event('change'))")
             b.click("#calibrate")
             b.until("a verdict", "return document.querySelector('#accept')")
-            o = s.json("GET", "/jobs")[0]["outcome"]
+            job = s.json("GET", "/jobs")[0]
+            assert job["order"]["channel"] == "green" and job["order"]["leave_out"] == [], job["order"]
+            o = job["outcome"]
             assert o["verdict"] in ("good", "usable") and not o["accepted"], o
             assert not os.path.exists(axis), "stored before anybody accepted it"
             b.click("#accept")

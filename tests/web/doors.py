@@ -111,6 +111,14 @@ def names(s, job):
     for recording in ("../station", "/etc", "scan/..", "scan\0", "nothing"):
         ended = s.job({"procedure": "scan", "recording": recording})
         assert ended["state"] == "failed", ended
+    # A pose file that would do lies beside the recording.
+    others = [shutil.copy(os.path.join(folder, "scan", f"poses.{kind}"), os.path.join(folder, f"others.{kind}")) for kind in ("csv", "json")]
+    picture = os.path.join(folder, "scan", "laser_000.png")
+    for extra in ({"poses": "../others"}, {"poses": "/etc/passwd"}, {"ambient": ["../station/x.png"]}, {"ambient": ["/etc/passwd"]}, {"ambient": [picture]}):
+        ended = s.job({"procedure": "scan", "recording": "scan", **extra})
+        assert ended["state"] == "failed" and ended["problem"]["kind"] in ("input", "usage"), (extra, ended)
+    for other in others:
+        os.unlink(other)
     os.unlink(os.path.join(jobs, job, "link.json"))
     os.unlink(os.path.join(jobs, job, "up"))
 

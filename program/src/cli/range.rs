@@ -2,11 +2,11 @@
 //! Frame and unit: camera and base frame; mm, degrees.
 
 use crate::cli::terminal::console::Console;
+use crate::cli::terminal::surroundings::in_folder;
+use crate::procedure::TouchOrder;
 use sheetlight::fault::Result;
-use sheetlight::recording::Recording;
-use sheetlight::rig::Rig;
 use sheetlight::robot::Convention;
-use sheetlight::station::{RangeReport, RangeRun, Settings, measure_range};
+use sheetlight::station::{RangeReport, Settings};
 use std::path::PathBuf;
 
 /// Measure distances with the laser pointer
@@ -20,29 +20,19 @@ use std::path::PathBuf;
   sheetlight range recordings/pointer --station cell3 --json > distances.json
 Guide: docs/finding-and-inserting.md")]
 pub struct Args {
-    /// Recording folder with a laser picture per frame
-    recording: PathBuf,
+    #[command(flatten)]
+    inputs: TouchOrder,
     /// Station folder with camera and pointer calibrations
     #[arg(long)]
     station: PathBuf,
-    /// Pose file of the recording, without extension [default: the one in meta.json]
-    #[arg(long)]
-    poses: Option<String>,
     /// All shots show one plane: compute its normal (needs poses and hand-eye)
     #[arg(long)]
     surface: bool,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    let recording = Recording::open(&args.recording)?;
-    let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
-    let run = RangeRun {
-        poses: args.poses.clone(),
-        one_surface: args.surface,
-        tool: settings.tool.map(|t| t.flange_from_tool),
-        ..RangeRun::default()
-    };
-    let report = measure_range(&recording, &rig, &run)?;
+    let settings = Settings::load(&args.station)?;
+    let report = in_folder(&args.station, console, |at| args.inputs.measure(at, &settings, args.surface))?;
     console.result(&report, &table(&report, settings.robot.unwrap_or(Convention::Matrix)));
     Ok(())
 }

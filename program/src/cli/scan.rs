@@ -5,12 +5,15 @@
 use super::capture::options::Capture;
 use super::capture::scanning::{Taken, scan_camera};
 use crate::cli::terminal::console::Console;
+use crate::cli::terminal::surroundings::in_folder;
+use crate::procedure::scan::no_ambient;
+use crate::procedure::{At, ScanOrder};
 use indicatif::ProgressBar;
 use sheetlight::fault::{Fault, Result};
 use sheetlight::raster::{Channel, Image, Light, load_sized};
 use sheetlight::recording::{Recording, load_poses};
 use sheetlight::rig::Rig;
-use sheetlight::scan::{Format, GridOptions, RawFormat, RawSource, Where};
+use sheetlight::scan::{Format, RawFormat, RawSource};
 use sheetlight::station::judge;
 use sheetlight::station::{Judged, ScanOptions, ScanReport, Settings, scan_recording};
 use std::path::{Path, PathBuf};
@@ -35,19 +38,15 @@ use std::path::{Path, PathBuf};
 All options: sheetlight help scan
 Guide: docs/scanning.md")]
 pub struct Args {
-    /// Recording folder with meta.json; not with --raw or --camera
-    #[arg(conflicts_with = "camera")]
-    recording: Option<PathBuf>,
+    #[command(flatten)]
+    order: ScanOrder,
     /// Station folder with the calibration
     #[arg(long)]
     station: PathBuf,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
-    /// Pose file of the recording, without extension [default: the one in meta.json]; with --raw a path
-    #[arg(long)]
-    poses: Option<String>,
-    /// Raw frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
+    /// Raw frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le; --poses is then a path
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<RawFormat>, conflicts_with = "recording")]
     raw: Option<RawFormat>,
     #[command(flatten)]
@@ -55,21 +54,6 @@ pub struct Args {
     /// Also store the camera's pictures as a recording in this folder
     #[arg(long, value_name = "FOLDER", requires = "camera")]
     record: Option<PathBuf>,
-    /// Channel of a colour picture: red, green, blue or luma
-    #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
-    channel: Channel,
-    /// Picture with the laser off at the shots' exposure, to subtract: in the recording, or a path; once per exposure
-    #[arg(long)]
-    ambient: Vec<PathBuf>,
-    /// Use exposure N of a recording with several, 1 is the shortest, instead of merging all
-    #[arg(long, value_name = "N", hide_short_help = true, conflicts_with_all = ["camera", "raw"])]
-    exposure: Option<usize>,
-    /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
-    #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
-    on: Where,
-    /// Cell of the height map, mm [default: about 1.5 points per cell]
-    #[arg(long, value_name = "MM")]
-    cell_mm: Option<f64>,
     /// Number of shots to draw with their peaks
     #[arg(long, hide_short_help = true, default_value_t = 6)]
     overlays: usize,
@@ -79,9 +63,6 @@ pub struct Args {
     /// Allow pictures and poses outside the recording's folder
     #[arg(long, hide_short_help = true)]
     pictures_outside: bool,
-    /// Exclude shots that cannot be read, and list them
-    #[arg(long)]
-    skip_bad: bool,
     /// Continue an interrupted scan into the same folder
     #[arg(long)]
     resume: bool,
@@ -92,24 +73,22 @@ pub struct Args {
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
+    let options = |at: &At| args.order.options(at, &settings, &rig, &args.out);
     let mut options = ScanOptions {
-        place: args.on,
-        grid: GridOptions { cell: args.cell_mm, ..GridOptions::default() },
         overlays: args.overlays,
-        skip_bad: args.skip_bad,
-        latency: sheetlight::capture::Latency::load(&args.station)?,
         resume: args.resume,
         stop: crate::cli::terminal::interrupt::asked_for(),
-        ..ScanOptions::for_station(&settings, &rig, &args.out)
+        ..in_folder(&args.station, console, options)?
     };
     if let Some(truth) = &args.truth {
         // A wrong path must be reported before the scan.
         sheetlight::files::length(truth)?;
     }
     let bar = console.bar("scanning", 0);
-    let report = match (&args.recording, args.raw) {
-        _ if args.capture.running.camera.is_some() => from_camera(args, &rig, &options, console, &bar)?,
-        (Some(folder), None) => from_recording(args, folder, &rig, &mut options, console, &bar)?,
+    let folder = Some(Path::new(&args.order.recording)).filter(|name| !name.as_os_str().is_empty());
+    let report = match (folder, args.raw) {
+        (None, _) if args.capture.running.camera.is_some() => from_camera(args, &rig, &options, console, &bar)?,
+        (Some(_), None) => from_recording(args, &rig, &mut options, console, &bar)?,
         (None, Some(raw)) => from_pipe(args, raw, &rig, &mut options, console, &bar)?,
         _ => {
             return Err(
@@ -118,8 +97,8 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         }
     };
     bar.finish_and_clear();
-    if let (0, Some(folder)) = (report.points, &args.recording) {
-        console.warn(format!("the scan has 0 points{}", seen(folder, args.channel)));
+    if let (0, Some(folder)) = (report.points, folder) {
+        console.warn(format!("the scan has 0 points{}", seen(folder, args.order.channel)));
     }
     let Some(truth) = args.truth.as_ref().filter(|_| report.points > 0) else {
         console.result(&report, &summary(&report, &args.out));
@@ -148,7 +127,7 @@ fn from_camera(
     let taken = Taken {
         capture: &args.capture,
         raw: args.raw,
-        poses: args.poses.as_deref().map(Path::new),
+        poses: args.order.poses.as_deref().map(Path::new),
         station: &args.station,
         keep: args.record.as_deref(),
         ambient: &|format| ambient_beside(args, format),
@@ -158,32 +137,21 @@ fn from_camera(
 
 fn from_recording(
     args: &Args,
-    folder: &Path,
     rig: &Rig,
     options: &mut ScanOptions,
     console: &Console,
     bar: &ProgressBar,
 ) -> Result<ScanReport> {
-    let mut recording = Recording::open(folder)?;
-    recording.channel = args.channel;
-    recording.outside = args.pictures_outside;
-    recording.read_out_as(args.capture.running.readout.stated())?;
-    if recording.meta.motion().axis().is_none() {
-        recording.pose_file(args.poses.as_deref())?.warnings.iter().for_each(|w| console.warn(w));
-    } else if args.poses.is_some() {
-        return Err(Fault::usage("--poses is given, and meta.json says that an axis moved")
-            .cause("another recording, or a motion that is not this one's")
-            .next("omit --poses, or correct 'motion' in meta.json"));
-    }
-    args.exposure.map(|n| recording.use_exposure(n)).transpose()?;
-    let place = |name: &PathBuf| {
-        let inside = folder.join(name);
-        if inside.is_file() { inside } else { name.clone() }
+    let open = |at: &At| {
+        let mut recording = args.order.open(at)?;
+        recording.outside = args.pictures_outside;
+        recording.read_out_as(args.capture.running.readout.stated())?;
+        let ambient = args.order.dark(at, &recording)?;
+        Ok((recording, ambient))
     };
-    let dark: Vec<Image> =
-        args.ambient.iter().map(|name| recording.load(&place(name)).map_err(no_ambient)).collect::<Result<_>>()?;
-    options.ambient = recording.dark(dark)?;
-    scan_recording(&recording, args.poses.as_deref(), rig, options, shown_by(bar))
+    let (recording, ambient) = in_folder(&args.station, console, open)?;
+    options.ambient = ambient;
+    scan_recording(&recording, args.order.poses.as_deref(), rig, options, shown_by(bar))
 }
 
 /// Scans frames from standard input.
@@ -195,7 +163,7 @@ fn from_pipe(
     console: &Console,
     bar: &ProgressBar,
 ) -> Result<ScanReport> {
-    let poses = args.poses.as_deref().ok_or_else(|| {
+    let poses = args.order.poses.as_deref().ok_or_else(|| {
         Fault::usage("frames on standard input, and no poses").next("give their poses in order: --poses FILE")
     })?;
     let file = load_poses(Path::new(poses))?;
@@ -239,19 +207,13 @@ fn seen(folder: &Path, channel: Channel) -> String {
 
 /// The picture with the laser off that --ambient names; it must have the frames' size.
 fn ambient_beside(args: &Args, f: Format) -> Result<Option<Image>> {
-    let load = |path: &PathBuf| load_sized(path, args.channel, f.bits, [f.width, f.height]).map_err(no_ambient);
-    if args.ambient.len() > 1 {
-        return Err(Fault::usage(format!("{} ambient pictures, the shots have one exposure", args.ambient.len()))
+    let ScanOrder { ambient, channel, .. } = &args.order;
+    let load = |path: &String| load_sized(Path::new(path), *channel, f.bits, [f.width, f.height]).map_err(no_ambient);
+    if ambient.len() > 1 {
+        return Err(Fault::usage(format!("{} ambient pictures, the shots have one exposure", ambient.len()))
             .next("give one --ambient"));
     }
-    args.ambient.first().map(load).transpose()
-}
-
-fn no_ambient(fault: Fault) -> Fault {
-    fault
-        .at("the ambient picture")
-        .cause("a picture of another camera or another setting, or no picture")
-        .next("take one picture with the laser off and nothing else changed")
+    ambient.first().map(load).transpose()
 }
 
 /// The output of `--json` with `--truth`.

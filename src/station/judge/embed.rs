@@ -3,7 +3,7 @@
 
 use crate::fault::Result;
 use base64::prelude::{BASE64_STANDARD, Engine};
-use maud::{Markup, html};
+use maud::{Markup, PreEscaped, html};
 use std::path::Path;
 
 /// Most bytes of a picture on the page.
@@ -19,7 +19,7 @@ pub(super) fn picture(folder: &Path, name: &str, caption: &str) -> Result<Markup
     let bytes = crate::files::read(&folder.join(name), MOST_PICTURE)?;
     Ok(html! {
         figure {
-            img alt=(caption) src=(format!("data:image/png;base64,{}", base64(&bytes)));
+            img alt=(caption) src=(PreEscaped(format!("data:image/png;base64,{}", base64(&bytes))));
             figcaption { (caption) }
         }
     })

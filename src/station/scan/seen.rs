@@ -60,9 +60,8 @@ impl Seen {
         }
     }
 
-    fn levels<T: Copy + Into<u16> + PartialOrd>(&mut self, image: &Image, pixels: &[T]) {
-        let mut counts = vec![0u32; usize::from(image.full_scale()) + 1];
-        pixels.iter().for_each(|&p| counts[usize::from(p.into())] += 1);
+    fn levels<T: Copy + Into<u16> + Ord>(&mut self, image: &Image, pixels: &[T]) {
+        let counts = counts(image.full_scale(), pixels);
         let mut below = 0;
         let median = counts.iter().position(|&n| {
             below += n as usize;
@@ -82,6 +81,10 @@ impl Seen {
             let half = median + (brightest - median).div_ceil(2);
             for (y, row) in (0..).zip(pixels.chunks(image.width as usize)) {
                 let lit = |p: &T| (*p).into() >= half;
+                // Most rows have no light; their largest level is found many pixels at a time.
+                if !row.iter().max().is_some_and(lit) {
+                    continue;
+                }
                 if let (Some(a), Some(b)) = (row.iter().position(lit), row.iter().rposition(lit)) {
                     widen(&mut self.light_px, a as u32, y);
                     widen(&mut self.light_px, b as u32, y);
@@ -138,6 +141,19 @@ impl Seen {
             )
         }
     }
+}
+
+/// The number of pixels of each level.
+fn counts<T: Copy + Into<u16>>(full_scale: u16, pixels: &[T]) -> Vec<u32> {
+    // Neighbours have mostly the same level, and an addition waits for the one before it in the same place. Four
+    // tables in turns take 7 ms where one took 26, in a dark picture of 4096x3072.
+    let mut tables = [(); 4].map(|()| vec![0u32; usize::from(full_scale) + 1]);
+    for four in pixels.chunks(4) {
+        tables.iter_mut().zip(four).for_each(|(table, &p)| table[usize::from(p.into())] += 1);
+    }
+    let [mut counts, others @ ..] = tables;
+    others.iter().for_each(|other| counts.iter_mut().zip(other).for_each(|(n, m)| *n += m));
+    counts
 }
 
 fn widen(range: &mut Option<[u32; 4]>, x: u32, y: u32) {

@@ -3,16 +3,16 @@
 //! Frame and unit: mm, mm/s.
 
 use super::joint::finish;
-use super::mount;
 use super::store::{Keep, stale};
 use crate::cli::insert::moving::Moving;
 use crate::cli::terminal::console::Console;
+use sheetlight::calibrate::hand_eye::options::Mount;
 use sheetlight::fault::Result;
 use sheetlight::recording::BoardSpec;
 use sheetlight::rig::Rig;
 use sheetlight::scan::Where;
 use sheetlight::station::volume::asked;
-use sheetlight::station::{ArmCell, AutoRun, JointRun, Settings, calibrate_auto};
+use sheetlight::station::{ArmCell, AutoRun, JointRun, Settings, calibrate_auto, mount_of};
 use std::path::PathBuf;
 
 /// Calibrate everything while the program moves the robot
@@ -41,8 +41,10 @@ pub struct Args {
     /// Target for the expected error of a scanned point, mm rms
     #[arg(long, value_name = "MM")]
     target_mm: f64,
-    #[command(flatten)]
-    mount: mount::Where,
+    /// Where the camera is: eye-in-hand (on the flange) or eye-to-hand (fixed) [default: the station's, else
+    /// eye-in-hand with a note]
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Mount>)]
+    mount: Option<Mount>,
     /// Largest number of stops
     #[arg(long, default_value_t = 40)]
     most: usize,
@@ -56,9 +58,10 @@ pub struct Args {
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let moving = &args.moving;
     let (settings, rig) = (Settings::load(&moving.station)?, Rig::load_camera(&moving.station)?);
-    let mount = args.mount.of(&moving.station, &settings, console)?;
+    let mounted = mount_of(&moving.station, &settings, args.mount)?;
+    mounted.assumed.iter().for_each(|why| console.say(why));
     let run = AutoRun {
-        joint: JointRun::new(mount, asked(&settings, None), &settings.extraction, args.on),
+        joint: JointRun::new(mounted.mount, asked(&settings, None), &settings.extraction, args.on),
         board: BoardSpec::load(&args.board)?,
         out: args.out.clone(),
         target_mm: args.target_mm,

@@ -1,16 +1,13 @@
 //! In: recordings of boards and a station. Out: the station's whole rig from one solve, stored together.
 //! Frame and unit: mm, degrees.
 
-use super::mount;
 use super::store::{Keep, figures, stale};
 use crate::cli::terminal::console::Console;
+use crate::cli::terminal::surroundings::{in_folder, with_bar};
+use crate::procedure::calibrate::JointOrder;
 use sheetlight::fault::{Fault, Result};
-use sheetlight::raster::Channel;
-use sheetlight::recording::Recording;
-use sheetlight::rig::{Rig, Verdict};
-use sheetlight::scan::Where;
-use sheetlight::station::volume::asked;
-use sheetlight::station::{JointResult, JointRun, Settings, calibrate_joint, store_joint};
+use sheetlight::rig::Verdict;
+use sheetlight::station::{JointResult, store_joint};
 use std::path::{Path, PathBuf};
 
 /// Calibrate everything in one solve from any recordings of boards
@@ -27,44 +24,17 @@ use std::path::{Path, PathBuf};
   sheetlight calibrate joint recordings/* --station cell3
 Guide: docs/joint.md")]
 pub struct Args {
-    /// Recording folders with meta.json
-    #[arg(required = true)]
-    recordings: Vec<PathBuf>,
+    #[command(flatten)]
+    inputs: JointOrder,
     /// Station folder for the results
     #[arg(long)]
     station: PathBuf,
-    /// Pose file of the recordings with robot poses, without extension [default: the one in meta.json]
-    #[arg(long)]
-    poses: Option<String>,
-    #[command(flatten)]
-    mount: mount::Where,
-    /// Nearest and farthest depth of the stated error, mm [default: the working volume, else where boards were lit]
-    #[arg(long, num_args = 2, value_names = ["NEAR", "FAR"])]
-    working_mm: Option<Vec<f64>>,
-    /// Channel of a colour picture: red, green, blue or luma
-    #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
-    channel: Channel,
-    /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
-    #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
-    on: Where,
     #[command(flatten)]
     keep: Keep,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    let (settings, rig) = (Settings::load(&args.station)?, Rig::load_camera(&args.station)?);
-    let mut recordings = args.recordings.iter().map(|r| Recording::open(r)).collect::<Result<Vec<_>>>()?;
-    recordings.iter_mut().for_each(|r| r.channel = args.channel);
-    let asked = asked(&settings, args.working_mm.as_ref().map(|w| [w[0], w[1]]));
-    let mount = args.mount.of(&args.station, &settings, console)?;
-    let run = JointRun { poses: args.poses.clone(), ..JointRun::new(mount, asked, &settings.extraction, args.on) };
-    let bar = console.bar("boards", 0);
-    let progress = |done: usize, all: usize| {
-        bar.set_length(all as u64);
-        bar.set_position(done as u64);
-    };
-    let result = calibrate_joint(&recordings, &rig, &run, &progress)?;
-    bar.finish_and_clear();
+    let result = with_bar(console, |progress| in_folder(&args.station, console, |at| args.inputs.solve(at, progress)))?;
     finish(&args.station, &result, &args.keep, console)?;
     stale(&args.station, console);
     Ok(())

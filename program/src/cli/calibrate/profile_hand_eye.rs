@@ -3,6 +3,7 @@
 
 use super::store::{Keep, finish};
 use crate::cli::terminal::console::Console;
+use crate::procedure::calibrate::Solved;
 use sheetlight::calibrate::limits::Asked;
 use sheetlight::calibrate::profile_sensor::ball::evaluate::Evaluation;
 use sheetlight::calibrate::profile_sensor::ball::options::{BallOptions, Side};
@@ -82,11 +83,11 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let (c, warnings) = calibrate_profile_hand_eye(&args.profiles, &args.poses, &target, &asked)?;
     warnings.iter().for_each(|w| console.warn(w));
     let n = Convention::Denso.write(&c.calibration.value);
-    let text = format!(
+    let value = format!(
         "sensor on the flange: {:.4} {:.4} {:.4} mm, RX {:.4} RY {:.4} RZ {:.4} degrees (R = Rz·Ry·Rx)",
         n[0], n[1], n[2], n[3], n[4], n[5]
     );
-    finish(station, &c.calibration, &c.page, &text, &args.keep, console)
+    finish(station, &Solved::of(c, value), &args.keep, console)
 }
 
 fn put_to_the_test(args: &Args, transform: &Path, target: &ProfileTarget, console: &Console) -> Result<()> {

@@ -2,10 +2,9 @@
 //! Frame and unit: none.
 
 use crate::cli::terminal::console::Console;
-use serde::Serialize;
-use sheetlight::calibrate::report::Page;
+use crate::procedure::calibrate::Solved;
 use sheetlight::fault::{Fault, Result};
-use sheetlight::rig::{Calibration, Kind, Measured, Quality, Rig, Verdict};
+use sheetlight::rig::{Kind, Quality, Rig, Verdict};
 use std::path::Path;
 
 /// What happens to a result that is badly determined.
@@ -25,27 +24,21 @@ impl Keep {
 
 /// Stores a calibration and its page and reports the result. A badly determined one is refused: the station keeps
 /// its present calibration, and the page shows the result.
-pub fn finish<T: Serialize + Measured>(
-    station: &Path,
-    calibration: &Calibration<T>,
-    page: &Page,
-    value: &str,
-    keep: &Keep,
-    console: &Console,
-) -> Result<()> {
-    let q = &calibration.quality;
+pub fn finish(station: &Path, solved: &Solved, keep: &Keep, console: &Console) -> Result<()> {
+    let Solved { record, page, value, .. } = solved;
+    let (q, kind) = (record.quality(), record.kind());
     if q.verdict >= Verdict::BadlyDetermined && !keep.keep_badly_determined {
         let folder = station.join("calibration");
         sheetlight::files::make_folder(&folder)?;
-        let html = folder.join(format!("{}.refused.html", calibration.kind.name()));
+        let html = folder.join(format!("{}.refused.html", kind.name()));
         page.save(&html)?;
         console.say(format!("{value}\n{}not stored; {}: what was found", figures(q), html.display()));
-        let what = format!("the {} is {}: {}", calibration.kind.words(), q.verdict.words(), q.reasons.join("; "));
+        let what = format!("the {} is {}: {}", kind.words(), q.verdict.words(), q.reasons.join("; "));
         return Err(Fault::refused(what)
             .cause("too few, too similar or contradicting pictures; the station keeps its former calibration")
             .next(q.advice.first().map_or("take more pictures", String::as_str)));
     }
-    let path = Rig::store(station, calibration, Some(&page.html()))?;
+    let path = Rig::store(station, record.as_ref(), Some(&page.html()))?;
     let html = path.with_extension("html");
     let mut text = format!("{value}\nverdict: {}\n", q.verdict.words());
     for r in &q.reasons {
@@ -56,11 +49,11 @@ pub fn finish<T: Serialize + Measured>(
     }
     text += &figures(q);
     text += &format!("stored {}\nreport {}", path.display(), html.display());
-    console.result(calibration, &text);
+    console.result(&record.json(), &text);
     if q.verdict >= Verdict::BadlyDetermined {
         console.warn("badly determined: see the reasons before using it");
     }
-    if calibration.kind == Kind::Camera {
+    if kind == Kind::Camera {
         stale(station, console);
     }
     Ok(())

@@ -1,6 +1,7 @@
 //! In: an option's value as typed. Out: the parsed value, or what was expected.
 //! Frame and unit: the option's.
 
+pub(crate) use crate::procedure::word::parse;
 use serde_json::Value;
 use sheetlight::fault::{Fault, Result};
 use std::collections::BTreeMap;
@@ -10,11 +11,6 @@ pub(crate) fn numbers<const N: usize>(s: &str) -> std::result::Result<[f64; N], 
     let read: Option<Vec<f64>> = s.split(',').map(|v| v.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
     let read = read.and_then(|v| v.try_into().ok());
     read.ok_or_else(|| format!("wanted {N} numbers parted by commas, e.g. {}", vec!["0"; N].join(",")))
-}
-
-/// Parses an option's value with the type's own `FromStr`, for clap's `value_parser`.
-pub(crate) fn parse<T: std::str::FromStr<Err = String>>(s: &str) -> std::result::Result<T, String> {
-    s.parse()
 }
 
 /// Parses words of the form NAME=VALUE; an empty VALUE means null.

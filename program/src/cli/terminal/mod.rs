@@ -1,5 +1,5 @@
-//! In: results, messages, signals. Out: stdout for data, stderr for people, options' values, a scan that ends on
-//! request.
+//! In: results, messages, signals. Out: stdout for data, stderr for people, options' values, the surroundings of
+//! procedures, a scan that ends on request.
 //! Frame and unit: none.
 
 pub mod arguments;
@@ -7,4 +7,5 @@ pub mod console;
 pub mod interrupt;
 pub mod outputs;
 pub mod printable;
+pub mod surroundings;
 pub mod threads;

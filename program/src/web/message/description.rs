@@ -2,51 +2,33 @@
 //! schemas, from which clients are generated.
 //! Frame and unit: none.
 
-use super::*;
+use super::MESSAGES;
 use schemars::generate::SchemaSettings;
+use schemars::{JsonSchema, SchemaGenerator};
 use serde_json::{Map, Value, json};
 use ts_rs::TS;
 
-/// Calls a macro with the name of every message.
-macro_rules! of_every_message {
-    ($call:ident) => {
-        $call! {
-            // The bar, job states and faults.
-            Mode, RobotState, Frames, CalibrationAge, Lease, Bar, JobState, Problem,
-            // Orders.
-            Target, TeachOrder, Plain, ScanOrder, Filter, Filters, Filtered, FilterOrder, FindOrder, TouchOrder,
-            CalibrateOrder, JointOrder, AutoOrder, InsertOrder, BenchmarkOrder, Order,
-            // Results of orders, and the camera's state in them.
-            CheckLine, ScanFigures, Notation, RobotPoses, Term, GateLight, Position, SurfaceTouched, SquareProposed,
-            Touched, CalibrationFigures, Inserted, StripeSeen, PictureLook, ExposureSet, CameraFeature, CameraState,
-            SetFeature, BenchRow, KeptUp, Outcome, Job,
-            // The robot's motions, and events for viewers.
-            Asked, SimulatedCell, MotionState, Arming, InTheCell, Event,
-            // Sessions, the lease and confirmations.
-            Knock, Session, TakeLease, Confirmed, Grant, Redeem,
-            // The station: calibrations, settings, recordings.
-            CalibrationState, FrameInfo, StationInfo, BackupInfo, Connection, SettingsState, SettingsAsk, OutputAsk,
-            RecordingInfo, BoardView, ViewRef, SupportAsk, PictureRef,
-            // Recipes and their drawings.
-            RecipeText, RecipeAsk, PointsOf, RecipePoint, NewPoint, PointChange, PointsChange, PointsChanged,
-            DrawingAsk, DrawingRead,
-            // Viewing a scan and measuring in it.
-            MapHead, Outlines, Ghost, SectionAsk, SectionPoint, Distance, Fit, Section, PointsAsk, PlaneAsk, Measure,
-            MeasureAnswer,
-            // Planned sweeps, and repeatability.
-            SweepAsk, Pace, SweepPlan, RepeatsAsk, Spread, Repeats,
-        }
-    };
+/// Makes a message's TypeScript declaration.
+pub type Declared = fn() -> String;
+/// Adds a message's schema to those of a generator.
+pub type Described = fn(&mut SchemaGenerator);
+
+/// The declaration of one message.
+pub fn declared<T: TS>() -> String {
+    T::decl()
+}
+
+/// Adds the schema of one message.
+pub fn described<T: JsonSchema>(to: &mut SchemaGenerator) {
+    to.subschema_for::<T>();
 }
 
 /// Content of `docs/messages.d.ts`; a test compares the file with this.
 pub fn declarations() -> String {
-    macro_rules! declared {
-        ($($message:ident,)*) => { [$(format!("export {}", $message::decl())),*] };
-    }
+    let declared: Vec<String> = MESSAGES.iter().map(|(declared, _)| format!("export {}", declared())).collect();
     format!(
         "// Made from program/src/web/message by the test `messages`; SHEETLIGHT_WRITE=1 makes it again.\n\n{}\n",
-        of_every_message!(declared).join("\n\n")
+        declared.join("\n\n")
     )
 }
 
@@ -54,10 +36,7 @@ pub fn declarations() -> String {
 pub fn schemas() -> Map<String, Value> {
     let settings = SchemaSettings::draft2020_12().with(|s| s.definitions_path = "/components/schemas".into());
     let mut generator = settings.into_generator();
-    macro_rules! described {
-        ($($message:ident,)*) => { $(generator.subschema_for::<$message>();)* };
-    }
-    of_every_message!(described);
+    MESSAGES.iter().for_each(|(_, described)| described(&mut generator));
     let mut schemas = generator.take_definitions(true);
     for name in schemas.keys().cloned().collect::<Vec<_>>() {
         name_kinds(&mut schemas, &name);
@@ -80,6 +59,8 @@ fn name_kinds(schemas: &mut Map<String, Value>, message: &str) {
         schemas[message] = json!({ "type": "string", "enum": words, "description": said.join("\n") });
         return;
     }
+    // A kind may have kinds of its own, and values that all of these share.
+    let common = schemas[message].clone();
     let tags: Option<Vec<Tag>> = kinds.iter().map(tag).collect();
     let Some(tags) = tags else { return };
     let (mut named, mut mapping) = (Vec::new(), Map::new());
@@ -91,10 +72,14 @@ fn name_kinds(schemas: &mut Map<String, Value>, message: &str) {
         let reference = format!("#/components/schemas/{name}");
         mapping.insert(word.clone(), reference.clone().into());
         named.push(json!({ "$ref": reference }));
-        let whole = with_what_it_refers_to(kind, schemas);
-        schemas.insert(name, whole);
+        let whole = joined(with_what_it_refers_to(kind, schemas), &common);
+        schemas.insert(name.clone(), whole);
+        name_kinds(schemas, &name);
     }
     let schema = &mut schemas[message];
+    for common in ["properties", "required", "type"] {
+        schema.as_object_mut().map(|schema| schema.remove(common));
+    }
     schema["oneOf"] = named.into();
     if let Some(key) = &tags[0].key {
         schema["discriminator"] = json!({ "propertyName": key, "mapping": mapping });
@@ -122,12 +107,17 @@ fn tag(kind: &Value) -> Option<Tag> {
 fn with_what_it_refers_to(mut kind: Value, schemas: &Map<String, Value>) -> Value {
     let Some(other) = kind.as_object_mut().and_then(|kind| kind.remove("$ref")) else { return kind };
     let other = other.as_str().and_then(|path| schemas.get(path.rsplit('/').next()?)).cloned().unwrap_or_default();
-    for (key, value) in other["properties"].as_object().into_iter().flatten() {
-        kind["properties"][key] = value.clone();
+    joined(kind, &other)
+}
+
+/// A kind with the values of another schema.
+fn joined(mut kind: Value, other: &Value) -> Value {
+    if let Some(values) = other["properties"].as_object() {
+        values.iter().for_each(|(key, value)| kind["properties"][key] = value.clone());
+        let mut required = kind["required"].as_array().cloned().unwrap_or_default();
+        required.extend(other["required"].as_array().into_iter().flatten().cloned());
+        kind["required"] = required.into();
+        kind["type"] = "object".into();
     }
-    let mut required = kind["required"].as_array().cloned().unwrap_or_default();
-    required.extend(other["required"].as_array().into_iter().flatten().cloned());
-    kind["required"] = required.into();
-    kind["type"] = "object".into();
     kind
 }

@@ -17,29 +17,46 @@ mod settings;
 mod surface;
 mod sweep;
 
-pub use bar::{Bar, CalibrationAge, Frames, Lease, Mode, RobotState};
-pub use camera::{CameraFeature, CameraState, ExposureSet, PictureLook, SetFeature, StripeSeen};
+use description::{Declared, Described, declared, described};
 pub use description::{declarations, schemas};
-pub use door::{Confirmed, Grant, Knock, Redeem, Session, TakeLease};
-pub use drawing::{DrawingAsk, DrawingRead, NewPoint, PointChange, PointsChange, PointsChanged, PointsOf, RecipePoint};
-pub use filter::{Filter, FilterOrder, Filtered, Filters};
-pub use job::{Event, Job, JobState, Problem};
-pub use motion::{Arming, Asked, InTheCell, MotionState, SimulatedCell};
-pub use order::{
-    AutoOrder, BenchmarkOrder, CalibrateOrder, FindOrder, InsertOrder, JointOrder, Order, Plain, ScanOrder, Target,
-    TeachOrder, TouchOrder,
-};
-pub use outcome::{
-    BenchRow, CalibrationFigures, CheckLine, GateLight, Inserted, KeptUp, Notation, Outcome, Position, Repeats,
-    RepeatsAsk, RobotPoses, ScanFigures, Spread, SquareProposed, SurfaceTouched, Term, Touched,
-};
-pub use place::{
-    BoardView, CalibrationState, FrameInfo, PictureRef, RecipeAsk, RecipeText, RecordingInfo, StationInfo, SupportAsk,
-    ViewRef,
-};
-pub use settings::{BackupInfo, Connection, OutputAsk, SettingsAsk, SettingsState};
-pub use surface::{
-    Distance, Fit, Ghost, MapHead, Measure, MeasureAnswer, Outlines, PlaneAsk, PointsAsk, Section, SectionAsk,
-    SectionPoint,
-};
-pub use sweep::{Pace, SweepAsk, SweepPlan};
+
+/// Lists the messages: what is not listed here is neither imported, declared nor described.
+macro_rules! messages {
+    ($($($place:ident)::+ { $($message:ident,)+ })+) => {
+        $(pub use $($place)::+::{$($message),+};)+
+
+        /// Each message's declaration and schema.
+        const MESSAGES: &[(Declared, Described)] = &[
+            $($((declared::<$message>, described::<$message>),)+)+
+        ];
+    };
+}
+
+messages! {
+    bar { Bar, CalibrationAge, Frames, Lease, Mode, RobotState, }
+    job { Event, Job, JobState, Problem, }
+    order { AutoOrder, BenchmarkOrder, FindOrder, InsertOrder, Order, Plain, TeachOrder, }
+    crate::procedure { ScanOrder, TouchOrder, }
+    crate::procedure::calibrate {
+        AxisOrder, CalibrateOrder, CameraOrder, HandEyeOrder, JointOrder, LaserPlaneOrder, PointerOrder,
+    }
+    filter { Filter, FilterOrder, Filtered, Filters, }
+    outcome {
+        BenchRow, CalibrationFigures, CheckLine, GateLight, Inserted, KeptUp, Notation, Outcome, Position, Repeats,
+        RepeatsAsk, RobotPoses, ScanFigures, Spread, SquareProposed, SurfaceTouched, Term, Touched,
+    }
+    camera { CameraFeature, CameraState, ExposureSet, PictureLook, SetFeature, StripeSeen, }
+    motion { Arming, Asked, InTheCell, MotionState, SimulatedCell, }
+    door { Confirmed, Grant, Knock, Redeem, Session, TakeLease, }
+    place {
+        BoardView, CalibrationState, FrameInfo, PictureRef, RecipeAsk, RecipeText, RecordingInfo, StationInfo,
+        SupportAsk, ViewRef,
+    }
+    settings { BackupInfo, Connection, OutputAsk, SettingsAsk, SettingsState, }
+    drawing { DrawingAsk, DrawingRead, NewPoint, PointChange, PointsChange, PointsChanged, PointsOf, RecipePoint, }
+    surface {
+        Distance, Fit, Ghost, MapHead, Measure, MeasureAnswer, Outlines, PlaneAsk, PointsAsk, Section, SectionAsk,
+        SectionPoint,
+    }
+    sweep { Pace, SweepAsk, SweepPlan, }
+}

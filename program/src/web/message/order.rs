@@ -2,15 +2,17 @@
 //! Frame and unit: mm, degrees; positions in a height map's grid.
 
 use super::FilterOrder;
+use crate::procedure::calibrate::{CalibrateOrder, JointOrder};
+use crate::procedure::{ScanOrder, TouchOrder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use ts_rs::TS;
 
 /// A procedure with its inputs. Recordings are named by their path below the recordings' folder, scans by their
 /// job.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema, strum::IntoStaticStr)]
 #[serde(tag = "procedure", rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Order {
     /// Checks station, disk and adapters, and every GPU stage against its CPU twin.
     Check(Plain),
@@ -55,29 +57,6 @@ pub struct BenchmarkOrder {
     pub rate_hz: Option<f64>,
 }
 
-/// The recording to scan, and the settings.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ScanOrder {
-    /// Path of the recording.
-    pub recording: String,
-    /// Cell size of the map, mm; null: chosen from the points' density.
-    #[serde(default)]
-    #[ts(optional = nullable)]
-    pub cell_mm: Option<f64>,
-    /// auto, gpu or cpu; null: auto.
-    #[serde(default)]
-    #[ts(optional = nullable)]
-    pub on: Option<String>,
-    /// Skip shots that cannot be read.
-    #[serde(default)]
-    pub skip_bad: bool,
-    /// Settings that differ from the station's: dotted keys of [extraction] in station.toml, and their values.
-    #[serde(default)]
-    #[ts(type = "Record<string, unknown>")]
-    pub settings: BTreeMap<String, serde_json::Value>,
-}
-
 /// What to find, and in which scans.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -91,35 +70,6 @@ pub struct FindOrder {
     #[serde(default)]
     #[ts(optional = nullable)]
     pub pins: Option<[[f64; 2]; 2]>,
-}
-
-/// The recording of a touched surface.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct TouchOrder {
-    /// Path of the recording of the pointer.
-    pub recording: String,
-}
-
-/// What to calibrate, and from which recording.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct CalibrateOrder {
-    /// What to calibrate.
-    pub target: Target,
-    /// Path of the recording.
-    pub recording: String,
-    /// Frames to exclude, counted from 0.
-    #[serde(default)]
-    pub leave_out: Vec<usize>,
-}
-
-/// The recordings for a joint calibration.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct JointOrder {
-    /// Recordings of boards.
-    pub recordings: Vec<String>,
 }
 
 /// A calibration that moves the robot itself.
@@ -155,22 +105,6 @@ pub struct InsertOrder {
     pub back_out: bool,
 }
 
-/// Target of a calibration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, TS, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Target {
-    /// Camera and lens.
-    Camera,
-    /// Pose of the camera on the flange.
-    HandEye,
-    /// The laser plane.
-    LaserPlane,
-    /// The pointer's beam.
-    Pointer,
-    /// A linear axis or turntable that moves parts in front of a fixed camera.
-    Axis,
-}
-
 /// A part taught by a few positions in a height map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -204,19 +138,6 @@ pub struct TeachOrder {
 impl Order {
     /// The name of the procedure in folders and pages.
     pub fn word(&self) -> &'static str {
-        match self {
-            Order::Check(_) => "check",
-            Order::Scan(_) => "scan",
-            Order::Filter(_) => "filter",
-            Order::Find(_) => "find",
-            Order::Teach(_) => "teach",
-            Order::Touch(_) => "touch",
-            Order::Tune(_) => "tune",
-            Order::Calibrate(_) => "calibrate",
-            Order::Joint(_) => "joint",
-            Order::Auto(_) => "auto",
-            Order::Insert(_) => "insert",
-            Order::Benchmark(_) => "benchmark",
-        }
+        self.into()
     }
 }

@@ -94,6 +94,8 @@ pub struct RecordingInfo {
     pub board: bool,
     /// robot, linear or turntable.
     pub motion: String,
+    /// The procedures that it suits: scan, touch, joint, or targets of a calibration.
+    pub suits: Vec<String>,
     /// Why it cannot be used; null: it can.
     pub problem: Option<Problem>,
 }

@@ -3,7 +3,7 @@
 //! Frame and unit: poses in a notation; s.
 
 use super::job::{Stored, has_ended, is_of_parts, procedure, shown, stored};
-use super::recording::{of_laser, of_target, taken, target};
+use super::recording::{taken, target};
 use crate::web::message::{CalibrateOrder, FindOrder, InsertOrder, Job, JobState, Order, ScanOrder};
 use crate::web::screen::{JOBS, Screen};
 use crate::web::work::{Place, recipe_named};
@@ -12,7 +12,7 @@ use sheetlight::robot::Convention;
 use sheetlight::station::Settings;
 use sheetlight::station::socket::words::{Code, Of, Reply, Request, Target, Which, Wrong};
 use sheetlight::station::socket::{Executor, RobotShown, Shown, Traffic};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -190,9 +190,8 @@ impl Plc {
     /// Scans a recording with the station's settings.
     fn scan(&mut self, recording: Option<String>) -> Result<Reply, Wrong> {
         self.order(false, |place| {
-            let recording = taken(place, recording, of_laser, "the laser line")?;
-            let settings = BTreeMap::new();
-            Ok(Order::Scan(ScanOrder { recording, cell_mm: None, on: None, skip_bad: false, settings }))
+            let recording = taken(place, recording, "scan", "the laser line")?;
+            Ok(Order::Scan(ScanOrder { recording, ..ScanOrder::default() }))
         })
     }
 
@@ -200,8 +199,8 @@ impl Plc {
     fn calibrate(&mut self, of: Target, recording: Option<String>) -> Result<Reply, Wrong> {
         self.order(false, |place| {
             let target = target(of);
-            let recording = taken(place, recording, |r| of_target(r, target), "boards that suits this calibration")?;
-            Ok(Order::Calibrate(CalibrateOrder { target, recording, leave_out: vec![] }))
+            let recording = taken(place, recording, target.into(), "boards that suits this calibration")?;
+            Ok(Order::Calibrate(CalibrateOrder::new(target, recording)))
         })
     }
 

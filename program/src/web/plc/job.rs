@@ -2,6 +2,7 @@
 //! Frame and unit: poses in a notation; s since 1970.
 
 use super::recording::target_shown;
+use crate::procedure::calibrate::Calibration;
 use crate::web::message::{CalibrationFigures, Job, JobState, MotionState, Order, Outcome};
 use crate::web::work::{Jobs, insertion_of, report_of};
 use sheetlight::rig::Verdict;
@@ -97,7 +98,7 @@ fn made(job: &Job) -> Option<Made> {
     let mut made = match &job.order {
         Order::Scan(ask) => Made { recording: ask.recording.clone(), ..Made::default() },
         Order::Calibrate(ask) => {
-            Made { recording: ask.recording.clone(), target: target_shown(ask.target), ..Made::default() }
+            Made { recording: ask.recording().to_owned(), target: target_shown(ask.target()), ..Made::default() }
         }
         _ => return None,
     };
@@ -160,7 +161,8 @@ fn short_of(outcome: &Outcome) -> Option<Wrong> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::web::message::{CalibrateOrder, InsertOrder, Problem, ScanFigures, ScanOrder, Target};
+    use crate::procedure::calibrate::Target;
+    use crate::web::message::{CalibrateOrder, InsertOrder, Problem, ScanFigures, ScanOrder};
     use sheetlight::fault::Fault;
 
     fn job(state: JobState, fault: Option<Fault>) -> Job {
@@ -220,8 +222,7 @@ mod tests {
 
     #[test]
     fn a_scan_shows_its_recording_and_at_its_end_its_numbers() {
-        let settings = Default::default();
-        let order = ScanOrder { recording: "a/b".into(), cell_mm: None, on: None, skip_bad: false, settings };
+        let order = ScanOrder { recording: "a/b".into(), ..ScanOrder::default() };
         let runs = Job { id: "0013-scan".into(), order: Order::Scan(order), ..job(JobState::Running, None) };
         let of_it = Made { recording: "a/b".into(), ..Made::default() };
         assert_eq!((shown_of(&runs).procedure, shown_of(&runs).made), (1, Some(of_it.clone())));
@@ -252,7 +253,7 @@ mod tests {
     #[test]
     fn a_calibration_shows_its_verdict_and_what_nobody_may_accept_is_an_error() {
         let of = |verdict: Option<Verdict>| {
-            let ask = CalibrateOrder { target: Target::HandEye, recording: "a".into(), leave_out: vec![] };
+            let ask = CalibrateOrder::new(Target::HandEye, "a".into());
             let figures = |verdict: Verdict| CalibrationFigures {
                 kind: "hand_eye".into(),
                 verdict: verdict.words().into(),

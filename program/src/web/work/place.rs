@@ -1,6 +1,7 @@
 //! In: the program's start options. Out: the folders of a station, and the recordings that are there.
 //! Frame and unit: px.
 
+use crate::procedure::suits;
 use crate::web::guard::plain;
 use crate::web::message::{Mode, Problem, RecordingInfo};
 use sheetlight::capture::record::is_recorded_into;
@@ -116,6 +117,7 @@ fn info(folder: &Path, name: &str) -> RecordingInfo {
                 MotionKind::Turntable => "turntable",
             }
             .into(),
+            suits: suits(&r.meta).into_iter().map(str::to_owned).collect(),
             problem: None,
         },
         Err(fault) => RecordingInfo {
@@ -127,6 +129,7 @@ fn info(folder: &Path, name: &str) -> RecordingInfo {
             beam: None,
             board: false,
             motion: String::new(),
+            suits: Vec::new(),
             problem: Some(Problem::from(&fault)),
         },
     }

@@ -5,16 +5,13 @@ use super::find::labels;
 use super::run::Run;
 use super::{calibrate, check, find, insert, scan, tune};
 use crate::bench::{WayTime, keep_up, recorded, way_times};
-use crate::web::guard::resolve;
-use crate::web::message::{BenchRow, KeptUp, Order, Outcome, SquareProposed, SurfaceTouched, Touched};
+use crate::web::message::{BenchRow, KeptUp, Order, Outcome, SquareProposed, SurfaceTouched, TouchOrder, Touched};
 use sheetlight::fault::Result;
 use sheetlight::geometry::Vec3;
 use sheetlight::gpu::Device;
-use sheetlight::recording::Recording;
-use sheetlight::rig::Rig;
 use sheetlight::robot::Convention;
 use sheetlight::scan::Where;
-use sheetlight::station::{RangeRun, Settings, measure_range};
+use sheetlight::station::Settings;
 
 /// Frame rate of a camera whose drops are counted, Hz; and the duration at each size, s.
 const RATE_HZ: f64 = 30.0;
@@ -28,9 +25,9 @@ pub(super) fn run(this: &Run, order: &Order) -> Result<Outcome> {
         Order::Filter(ask) => scan::filter(this, ask),
         Order::Find(ask) => find::find(this, ask),
         Order::Teach(ask) => find::teach(this, ask),
-        Order::Touch(ask) => touch(this, &ask.recording),
+        Order::Touch(ask) => touch(this, ask),
         Order::Tune(_) => tune::tune(this),
-        Order::Calibrate(ask) => calibrate::calibrate(this, ask.target, &ask.recording, &ask.leave_out),
+        Order::Calibrate(ask) => calibrate::calibrate(this, ask),
         Order::Joint(ask) => calibrate::joint(this, ask),
         Order::Auto(ask) => calibrate::auto(this, ask),
         Order::Insert(ask) => insert::insert(this, ask),
@@ -38,12 +35,9 @@ pub(super) fn run(this: &Run, order: &Order) -> Result<Outcome> {
     }
 }
 
-fn touch(this: &Run, recording: &str) -> Result<Outcome> {
-    let place = &this.jobs.place;
-    let recording = Recording::open(&resolve(&place.recordings, recording)?)?;
-    let settings = Settings::load(&place.station)?;
-    let run = RangeRun { one_surface: true, tool: settings.tool.map(|t| t.flange_from_tool), ..RangeRun::default() };
-    let report = measure_range(&recording, &Rig::load(&place.station)?, &run)?;
+fn touch(this: &Run, order: &TouchOrder) -> Result<Outcome> {
+    let settings = Settings::load(&this.jobs.place.station)?;
+    let (report, remarks) = this.remarked(|at| order.measure(at, &settings, true))?;
     let surface = report.surface.map(|s| SurfaceTouched {
         normal: s.normal,
         centre_mm: s.centre_mm,
@@ -62,7 +56,13 @@ fn touch(this: &Run, recording: &str) -> Result<Outcome> {
         tool: convention.write(&q.base_from_tool),
     });
     let spots = report.distances.into_iter().map(|d| (d.picture, d.along_axis_mm, d.along_axis_sigma_mm)).collect();
-    Ok(Outcome::Touch(Box::new(Touched { spots, surface, square, missing: report.missing, remarks: report.remarks })))
+    Ok(Outcome::Touch(Box::new(Touched {
+        spots,
+        surface,
+        square,
+        missing: report.missing,
+        remarks: [report.remarks, remarks].concat(),
+    })))
 }
 
 fn benchmark(this: &Run, rate_hz: Option<f64>) -> Result<Outcome> {

@@ -3,42 +3,34 @@
 
 use super::run::Run;
 use super::store::scan_of;
-use crate::web::guard::resolve;
-use crate::web::message::{FilterOrder, Frames, Outcome, ScanFigures, ScanOrder};
-use sheetlight::capture::Latency;
-use sheetlight::fault::{Fault, Result};
+use crate::procedure::{At, ScanOrder};
+use crate::web::message::{FilterOrder, Frames, Outcome, ScanFigures};
+use sheetlight::fault::Result;
 use sheetlight::recording::Recording;
 use sheetlight::rig::Rig;
-use sheetlight::scan::{GridOptions, Where};
-use sheetlight::station::{ScanOptions, ScanReport, Settings, Watch, changed, filter_scan, scan_recording};
+use sheetlight::station::{ScanOptions, ScanReport, Settings, Watch, filter_scan, scan_recording};
 
-pub(super) fn scan(this: &Run, asked: &ScanOrder) -> Result<Outcome> {
+pub(super) fn scan(this: &Run, order: &ScanOrder) -> Result<Outcome> {
     let place = &this.jobs.place;
     let (settings, rig) = (Settings::load(&place.station)?, Rig::load(&place.station)?);
-    let settings = changed(&settings, "extraction", &asked.settings)?;
-    let recording = Recording::open(&resolve(&place.recordings, &asked.recording)?)?;
-    let size = [recording.meta.image.width, recording.meta.image.height];
-    let place_to_run: Where = asked
-        .on
-        .as_deref()
-        .unwrap_or("auto")
-        .parse()
-        .map_err(|e: String| Fault::usage(e).next("choose one of them"))?;
     let out = this.folder.join("scan");
-    // A scan that ended before its first checkpoint starts again.
-    let resume = this.again && out.join("scan.part/progress.json").exists();
-    let options = ScanOptions {
-        place: place_to_run,
-        grid: GridOptions { cell: asked.cell_mm, ..GridOptions::default() },
-        overlays: 6,
-        skip_bad: asked.skip_bad,
-        latency: Latency::load(&place.station)?,
-        resume,
-        stop: this.stop.clone(),
-        watch: watch(this, &recording, size),
-        ..ScanOptions::for_station(&settings, &rig, &out)
+    let prepare = |at: &At| {
+        let recording = order.open(at)?;
+        let options = ScanOptions {
+            ambient: order.dark(at, &recording)?,
+            overlays: 6,
+            // A scan that ended before its first checkpoint starts again.
+            resume: this.again && out.join("scan.part/progress.json").exists(),
+            stop: this.stop.clone(),
+            watch: watch(this, &recording),
+            ..order.options(at, &settings, &rig, &out)?
+        };
+        Ok((recording, options))
     };
-    let report = scan_recording(&recording, None, &rig, &options, |done, of| this.progress(done, of))?;
+    let ((recording, options), remarks) = this.remarked(prepare)?;
+    let poses = order.poses.as_deref();
+    let mut report = scan_recording(&recording, poses, &rig, &options, |done, of| this.progress(done, of))?;
+    report.remarks.extend(remarks);
     let mut frames = this.jobs.frames.lock().unwrap_or_else(|e| e.into_inner());
     for (_, why) in &report.skipped {
         *frames.dropped.entry(format!("excluded: {why}")).or_default() += 1;
@@ -56,7 +48,8 @@ pub(super) fn filter(this: &Run, asked: &FilterOrder) -> Result<Outcome> {
 }
 
 /// Counts frames and extends the height map that pages show.
-fn watch(this: &Run, recording: &Recording, size: [u32; 2]) -> Watch {
+fn watch(this: &Run, recording: &Recording) -> Watch {
+    let size = [recording.meta.image.width, recording.meta.image.height];
     let shots = recording.meta.frames.iter().filter(|f| f.laser.is_some()).count();
     this.jobs.hub.growing.begin(this.number, shots);
     *this.jobs.frames.lock().unwrap_or_else(|e| e.into_inner()) = Frames::default();

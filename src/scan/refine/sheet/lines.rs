@@ -34,6 +34,8 @@ const USUAL: f64 = 0.75;
 /// Lines to each side that are stepped over at most because the camera stood. It may stand longer: the points between
 /// have no neighbours and stay.
 const HELD: u32 = 7;
+/// Lines whose neighbours are compared at once, on all processor cores.
+const TOGETHER: usize = 16;
 /// Points of a line at which its way to another is measured.
 const SAMPLES: usize = 64;
 
@@ -288,7 +290,7 @@ impl Line {
         let some = |lines: Vec<&Arc<Line>>| lines.into_iter().rev().step_by(every).cloned().collect::<Vec<_>>();
         let beyond = (near.ends > 0).then(|| [some(before), some(after)].concat());
         let pull = |i| self.pull(i, &pairs, beyond.as_deref());
-        let pulls = (0..self.points.len()).into_par_iter().with_min_len(64).map(pull).collect();
+        let pulls = (0..self.points.len()).map(pull).collect();
         Pulled { line: self.clone(), pulls, far }
     }
 }
@@ -316,13 +318,19 @@ pub(super) fn lines(
     // The lines near those that were not passed on yet, and the number of those before them.
     let (mut near, mut done): (VecDeque<Arc<Line>>, usize) = (VecDeque::new(), 0);
     let mut pass = |near: &mut VecDeque<Arc<Line>>, upto: u64| -> Result<()> {
-        while near.get(done).is_some_and(|line| u64::from(line.shot) + u64::from(within) <= upto) {
-            take(near[done].clone().pulled(near, neighbours))?;
-            done += 1;
-            while near.len() > done && near[0].shot + within < near[done].shot {
-                near.pop_front();
-                done -= 1;
-            }
+        let known = |line: &&Arc<Line>| u64::from(line.shot) + u64::from(within) <= upto;
+        let ready = near.range(done..).take_while(known).count();
+        if ready < TOGETHER && upto < u64::MAX {
+            return Ok(());
+        }
+        let pulled = |line: &Arc<Line>| line.clone().pulled(near, neighbours);
+        let pulled: Vec<Pulled> =
+            near.range(done..done + ready).collect::<Vec<_>>().into_par_iter().map(pulled).collect();
+        pulled.into_iter().try_for_each(&mut *take)?;
+        done += ready;
+        while near.get(done).is_some_and(|next| near[0].shot + within < next.shot) {
+            near.pop_front();
+            done -= 1;
         }
         Ok(())
     };

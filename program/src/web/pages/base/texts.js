@@ -1,11 +1,33 @@
 // The only table of texts: English, then German, Chinese, Japanese.
 
 export const TABLE = {
+  "Colour channel": ["Farbkanal", "颜色通道", "カラーチャンネル"],
+  "Farthest depth, mm": ["Größte Tiefe, mm", "最大深度，mm", "最大深度, mm"],
+  "Lens terms": ["Terme der Linse", "镜头畸变项", "レンズ歪みの項"],
+  "Mount of the camera": ["Befestigung der Kamera", "相机安装方式", "カメラの取り付け"],
+  "Nearest depth, mm": ["Kleinste Tiefe, mm", "最小深度，mm", "最小深度, mm"],
   "None. --mqtt URI publishes state, jobs and results; --modbus ADDR serves registers to a PLC.": [
     "Keine. --mqtt URI veröffentlicht Zustand, Aufträge, Ergebnisse; --modbus ADDR bietet einer SPS Register.",
     "无。--mqtt URI 发布状态、任务和结果；--modbus ADDR 向 PLC 提供寄存器。",
     "なし。--mqtt URI は状態・ジョブ・結果を発行し、--modbus ADDR は PLC にレジスターを提供します。"
   ],
+  "Options": ["Optionen", "选项", "オプション"],
+  "Pose file": ["Posendatei", "位姿文件", "姿勢ファイル"],
+  "Run on": ["Rechnen auf", "运行设备", "実行先"],
+  "Scatter of the robot, degrees": [
+    "Streuung des Roboters, Grad",
+    "机器人散布，度",
+    "ロボットのばらつき, 度"
+  ],
+  "Scatter of the robot, mm": [
+    "Streuung des Roboters, mm",
+    "机器人散布，mm",
+    "ロボットのばらつき, mm"
+  ],
+  "Shape of the board": ["Form der Tafel", "标定板形状", "ボードの形状"],
+  "Skew": ["Scherung", "倾斜", "スキュー"],
+  "Working distance, mm": ["Arbeitsabstand, mm", "工作距离，mm", "作業距離, mm"],
+  "as the station": ["wie die Station", "与工作站一致", "ステーションに従う"],
   "connected": ["verbunden", "已连接", "接続中"],
   "waits for other programs": [
     "wartet auf andere Programme",

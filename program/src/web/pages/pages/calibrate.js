@@ -9,6 +9,7 @@ import { operate, operating } from "../widgets/bar.js";
 import { byTheRobot } from "../widgets/rig/auto.js";
 import { axisGauge } from "../widgets/rig/axisgauge.js";
 import { gauges } from "../widgets/rig/boards.js";
+import { form, inputs } from "../widgets/form.js";
 import { livePicture } from "../widgets/view/live.js";
 import { attempt } from "../widgets/problem.js";
 import { choice, follow, order, panel, recordings, table } from "../widgets/parts.js";
@@ -22,17 +23,8 @@ const TARGETS = {
   pointer: "Pointer",
   axis: "Axis",
 };
-const SUITS = {
-  joint: (r) => r.board,
-  camera: (r) => r.board,
-  hand_eye: (r) => r.board && !r.beam,
-  laser_plane: (r) => r.board && r.beam !== "pointer",
-  pointer: (r) => r.board && r.beam !== "line",
-  axis: (r) => r.board && r.motion !== "robot",
-};
-
 export async function show(place, query) {
-  const all = await recordings((r) => r.board);
+  const all = await recordings("joint");
   const named = store.jobs.get(query.get("job"));
   let target =
       query.get("target") ??
@@ -40,7 +32,9 @@ export async function show(place, query) {
       { auto: "auto", joint: "joint" }[named?.order.procedure] ??
       "camera",
     name = named?.order.recording,
-    out = new Set(named?.order.leave_out ?? []);
+    out = new Set(named?.order.leave_out ?? []),
+    /** Inputs that the form sets. */
+    set = {};
   const problem = h("div"),
     progress = h("div"),
     pictures = h("div"),
@@ -48,6 +42,7 @@ export async function show(place, query) {
     held = h("div", { class: "stack" }),
     stops = h("div"),
     live = h("div"),
+    further = h("details"),
     head = h("div", { class: "head" });
   const seen = gauges(held),
     ridden = axisGauge(stops);
@@ -56,7 +51,7 @@ export async function show(place, query) {
     result = null;
   const body = h("div", { class: "split" });
   let leave = () => {};
-  const fits = () => all.filter(SUITS[target] ?? (() => false));
+  const fits = () => all.filter((r) => r.suits.includes(target));
   const chosen = new Set(named?.order.recordings ?? all.map((r) => r.name));
   const current = () =>
     fits().find((r) => r.name === name) ??
@@ -81,6 +76,7 @@ export async function show(place, query) {
                 target = k;
                 name = undefined;
                 out = new Set();
+                set = {};
                 result = null;
                 latest();
               },
@@ -112,8 +108,8 @@ export async function show(place, query) {
     attempt(async () => {
       const j = await order(
         target === "joint"
-          ? { procedure: "joint", recordings: [...chosen] }
-          : { procedure: "calibrate", target, recording: name, leave_out: [...out] },
+          ? { procedure: "joint", recordings: [...chosen], ...set }
+          : { procedure: "calibrate", target, recording: name, leave_out: [...out], ...set },
       );
       follows();
       follows = follow(progress, j.id, shown);
@@ -284,8 +280,25 @@ export async function show(place, query) {
       );
     }
   }
+  /** The form of the target's inputs; what the job in the address stated is set. */
+  async function options() {
+    fill(further);
+    if (target === "auto") return;
+    const mine = target;
+    const word = target.replace(/(^|_)./g, (c) => c.at(-1).toUpperCase());
+    const list = await inputs(target === "joint" ? "OrderJoint" : `OrderCalibrate${word}`);
+    if (mine !== target) return;
+    for (const [input, { default: usual }] of list) {
+      const stated = sameTarget(named) ? named.order[input] : undefined;
+      if (stated !== undefined && stated !== null && stated !== (usual ?? false))
+        set[input] = stated;
+    }
+    fill(further, h("summary", {}, t("Options")), form(list, set));
+  }
+  const sameTarget = (j) => (j?.order.target ?? j?.order.procedure) === target;
   const latest = () => {
     fill(verdict);
+    attempt(options, problem);
     looks++;
     heads();
     leave();
@@ -317,7 +330,7 @@ export async function show(place, query) {
     const last = jobs((j) => j.state === "done" && same(j))[0];
     last ? shown(last) : thumbs();
   };
-  fill(place, head, problem, progress, body);
+  fill(place, head, further, problem, progress, body);
   latest();
   return () => {
     looks++;

@@ -40,7 +40,7 @@ const HERE = ["localhost", "127.0.0.1", "[::1]"].includes(location.hostname);
 const beside = () => (HERE ? Math.min(2000, 500 * (store.bar?.viewers ?? 1)) : 250);
 
 export async function show(place) {
-  const list = await recordings(() => true);
+  const list = await recordings();
   const camera = store.bar?.camera;
   if (!list.length && !camera)
     return void fill(

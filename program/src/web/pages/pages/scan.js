@@ -19,7 +19,7 @@ import {
 } from "../widgets/parts.js";
 
 export async function show(place, query) {
-  const list = await recordings((r) => r.beam !== "pointer" && !r.board);
+  const list = await recordings("scan");
   const named = query.get("job") && store.jobs.get(query.get("job"));
   let chosen = (named?.order.recording ?? sessionStorage.getItem("recording")) || list[0]?.name;
   let on_ = "auto";

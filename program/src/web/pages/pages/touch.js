@@ -8,7 +8,7 @@ import { attempt } from "../widgets/problem.js";
 import { figures, follow, gallery, order, panel, recordings, table } from "../widgets/parts.js";
 
 export async function show(place, query) {
-  const list = await recordings((r) => r.beam === "pointer" && !r.board && r.motion === "robot");
+  const list = await recordings("touch");
   let chosen =
     store.jobs.get(query.get("job"))?.order.recording ??
     (list.find((r) => /surface|touch/.test(r.name)) ?? list[0])?.name;

@@ -137,9 +137,11 @@ export function scanChoice(query, changed) {
 export const nothing = (what, page, words) =>
   h("div", { class: "panel" }, h("p", {}, what), h("a", { href: `#/${page}` }, words));
 
-/** Readable recordings for which `keep` is true. */
-export const recordings = async (keep) =>
-  (await get("/recordings")).filter((r) => !r.problem && keep(r));
+/** Readable recordings, all of them or those that suit a procedure. */
+export const recordings = async (procedure) =>
+  (await get("/recordings")).filter(
+    (r) => !r.problem && (!procedure || r.suits.includes(procedure)),
+  );
 
 /** Shows recordings as pictures; a click chooses one. */
 export function gallery(list, current, chosen) {
@@ -149,8 +151,16 @@ export function gallery(list, current, chosen) {
     list.map((r) =>
       h(
         "button",
-        { class: "thumb", "aria-pressed": String(r.name === current), onclick: () => chosen(r) },
-        h("img", { src: picture(r.name, Math.floor(r.frames / 2), 240), alt: "", loading: "lazy" }),
+        {
+          class: "thumb",
+          "aria-pressed": String(r.name === current),
+          onclick: () => chosen(r),
+        },
+        h("img", {
+          src: picture(r.name, Math.floor(r.frames / 2), 240),
+          alt: "",
+          loading: "lazy",
+        }),
         h("span", {}, h("b", {}, r.name)),
         h("span", { class: "quiet" }, `${r.frames} × ${r.width}×${r.height}`),
       ),

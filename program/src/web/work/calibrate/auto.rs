@@ -4,7 +4,7 @@
 
 use super::super::place::Place;
 use super::super::run::Run;
-use super::together::{keep, run};
+use super::together::keep;
 use crate::web::guard::plain;
 use crate::web::message::{AutoOrder, Outcome};
 use crate::web::motion::{Person, Session};
@@ -12,7 +12,9 @@ use sheetlight::fault::{Fault, Result};
 use sheetlight::recording::BoardSpec;
 use sheetlight::rig::Rig;
 use sheetlight::robot::Convention;
-use sheetlight::station::{ArmCell, AutoRun, Settings, calibrate_auto, mount_of};
+use sheetlight::scan::Where;
+use sheetlight::station::volume::asked;
+use sheetlight::station::{ArmCell, AutoRun, JointRun, Settings, calibrate_auto, mount_of};
 use std::path::PathBuf;
 
 /// Most stops if the order states none.
@@ -48,8 +50,8 @@ pub(in crate::web::work) fn auto(this: &Run, order: &AutoOrder) -> Result<Outcom
         Fault::refused("no camera: the screen was served without --camera").next("start it with --camera URI")
     })?;
     let mounted = mount_of(&place.station, &settings, None)?;
-    let asked = AutoRun {
-        joint: run(&settings, &mounted),
+    let run = AutoRun {
+        joint: JointRun::new(mounted.mount, asked(&settings, None), &settings.extraction, Where::default()),
         board: board(place, &order.board)?,
         out: folder(this),
         target_mm: order.target_mm,
@@ -58,22 +60,22 @@ pub(in crate::web::work) fn auto(this: &Run, order: &AutoOrder) -> Result<Outcom
         candidates: 150,
         seed: 1,
     };
-    asked.check()?;
+    run.check()?;
     let mut session = Session::begin(desk, &this.id, &this.stop)?;
     let within_s = session.guard().limits().map_or(0.0, |l| l.max_shown_s);
     let robot = settings.robot.unwrap_or(Convention::Denso);
     let mut person = Person { desk, job: &this.id, stop: &this.stop, robot, within_s, step: &|_| {}, late: false };
     let mut cell =
         ArmCell::new(session.guard(), camera.lend()?, settings.outputs.unwrap_or_default(), &mut person, None)?;
-    let most = asked.most;
+    let most = run.most;
     let told = |stops: usize, mm: f64| {
         this.progress(stops, Some(most));
         desk.expects(stops, mm);
     };
-    let result = calibrate_auto(&mut cell, &rig, &asked, &told)?;
+    let result = calibrate_auto(&mut cell, &rig, &run, &told)?;
     drop(cell);
     drop(session);
-    Ok(Outcome::Auto(Box::new(keep(this, &result.joint, &mounted)?)))
+    Ok(Outcome::Auto(Box::new(keep(this, &result.joint, mounted.assumed.into_iter().collect())?)))
 }
 
 /// Folder for this attempt's pictures. An interrupted attempt keeps its pictures, and the next one uses another

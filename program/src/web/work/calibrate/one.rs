@@ -4,22 +4,11 @@
 
 use super::super::jobs::Jobs;
 use super::super::run::Run;
-use crate::web::guard::resolve;
-use crate::web::message::{CalibrationFigures, Job, JobState, Order, Outcome, Target};
-use serde::Serialize;
-use sheetlight::calibrate::camera::procedure::{CameraOptions, calibrate as camera};
-use sheetlight::calibrate::camera::report::page;
-use sheetlight::calibrate::laser_plane::options::LaserPlaneOptions;
-use sheetlight::calibrate::report::Page;
+use crate::procedure::calibrate::{CalibrateOrder, Calibration, Solved};
+use crate::web::message::{CalibrationFigures, Job, JobState, Order, Outcome};
 use sheetlight::fault::{Fault, Result};
-use sheetlight::recording::Recording;
-use sheetlight::rig::{Calibration, Kind, Quality, Rig, Verdict};
-use sheetlight::scan::Where;
-use sheetlight::station::volume::asked;
-use sheetlight::station::{
-    AxisRun, HandEyeResult, HandEyeRun, LaserPlaneRun, PointerRun, Settings, back_up_here, calibrate_axis,
-    calibrate_hand_eye, calibrate_laser_plane, calibrate_pointer, mount_of,
-};
+use sheetlight::rig::{Kind, Quality, Rig, Verdict};
+use sheetlight::station::back_up_here;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -27,94 +16,22 @@ use std::path::Path;
 const RESULT: &str = "calibration.json";
 const PAGE: &str = "calibration.html";
 
-pub(in crate::web::work) fn calibrate(this: &Run, target: Target, name: &str, leave_out: &[usize]) -> Result<Outcome> {
-    let place = &this.jobs.place;
-    let recording = without(Recording::open(&resolve(&place.recordings, name)?)?, leave_out)?;
-    let settings = Settings::load(&place.station)?;
-    let progress = |done: usize, of: usize| this.progress(done, Some(of));
-    if target == Target::Camera {
-        let options = CameraOptions { asked: asked(&settings, None), ..CameraOptions::default() };
-        let result = camera(&[recording], &options, &|done, of| this.progress(done, Some(of)))?;
-        let page = page(&result, &format!("Camera calibration of {}", settings.name));
-        return keep(this, &result.calibration, &page, result.left_out);
-    }
-    let rig = Rig::load_to_calibrate(&place.station)?;
-    match target {
-        Target::LaserPlane => {
-            let run = LaserPlaneRun {
-                solver: LaserPlaneOptions::default(),
-                asked: asked(&settings, None),
-                extraction: settings.extraction.clone(),
-                place: Where::default(),
-            };
-            let c = calibrate_laser_plane(&recording, &rig, &run, &progress)?;
-            keep(this, &c.calibration, &c.page, c.missing)
-        }
-        Target::Pointer => {
-            let run =
-                PointerRun { spots: Default::default(), solver: Default::default(), asked: asked(&settings, None) };
-            let c = calibrate_pointer(&recording, &rig, &run, &progress)?;
-            keep(this, &c.calibration, &c.page, c.missing)
-        }
-        Target::Axis => {
-            let run = AxisRun { asked: asked(&settings, None), ..AxisRun::default() };
-            let c = calibrate_axis(&recording, &rig, &run, &progress)?;
-            keep(this, &c.calibration, &c.page, c.missing)
-        }
-        Target::Camera | Target::HandEye => {
-            let mounted = mount_of(&place.station, &settings, None)?;
-            let (mount, asked) = (mounted.mount, asked(&settings, None));
-            let run = HandEyeRun { poses: None, mount, solver: Default::default(), asked };
-            let kept = match calibrate_hand_eye(&recording, &rig, &run, &progress)? {
-                HandEyeResult::OnFlange(c) => keep(this, &c.calibration, &c.page, c.missing),
-                HandEyeResult::InBase(c) => keep(this, &c.calibration, &c.page, c.missing),
-            };
-            kept.map(|outcome| saying(outcome, mounted.assumed))
-        }
-    }
-}
-
-/// An outcome that also states what was assumed.
-fn saying(mut outcome: Outcome, assumed: Option<String>) -> Outcome {
-    if let Outcome::Calibrate(figures) = &mut outcome {
-        figures.reasons.extend(assumed);
-    }
-    outcome
-}
-
-/// The recording without some of its frames; the others keep their poses.
-fn without(mut recording: Recording, leave_out: &[usize]) -> Result<Recording> {
-    let all = recording.meta.frames.len();
-    if let Some(strange) = leave_out.iter().find(|i| **i >= all) {
-        return Err(
-            Fault::usage(format!("frame {strange} shall be excluded, but there are {all}")).next("choose one of them")
-        );
-    }
-    for (i, frame) in recording.meta.frames.iter_mut().enumerate() {
-        frame.pose.get_or_insert(i);
-    }
-    let mut index = 0;
-    recording.meta.frames.retain(|_| {
-        index += 1;
-        !leave_out.contains(&(index - 1))
-    });
-    Ok(recording)
-}
-
-fn keep<T: Serialize>(this: &Run, c: &Calibration<T>, page: &Page, left_out: Vec<(String, String)>) -> Result<Outcome> {
-    let text = serde_json::to_string_pretty(c).expect("plain data");
+pub(in crate::web::work) fn calibrate(this: &Run, order: &CalibrateOrder) -> Result<Outcome> {
+    let (Solved { record, page, excluded, .. }, remarks) =
+        this.remarked(|at| order.solve(at, &|done, of| this.progress(done, Some(of))))?;
+    let text = serde_json::to_string_pretty(&record.json()).expect("plain data");
     let (result, html) = (this.folder.join(RESULT), this.folder.join(PAGE));
     sheetlight::files::write_beside((&result, text.as_bytes()), &[(&html, page.html().as_bytes())])?;
-    let q = &c.quality;
+    let (q, kind) = (record.quality(), record.kind());
     Ok(Outcome::Calibrate(Box::new(CalibrationFigures {
-        kind: c.kind.name().into(),
+        kind: kind.name().into(),
         verdict: q.verdict.words().into(),
-        reasons: q.reasons.clone(),
+        reasons: q.reasons.iter().cloned().chain(remarks).collect(),
         advice: q.advice.clone(),
         figures: q.figures.clone(),
-        former: former(&this.jobs.place.station, c.kind),
+        former: former(&this.jobs.place.station, kind),
         per_picture: q.per_picture.clone(),
-        left_out,
+        left_out: excluded,
         accepted: false,
     })))
 }

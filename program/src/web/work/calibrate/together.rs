@@ -3,42 +3,23 @@
 //! Frame and unit: mm, degrees.
 
 use super::super::run::Run;
-use crate::web::guard::resolve;
-use crate::web::message::{CalibrationFigures, JointOrder, Outcome};
-use sheetlight::fault::{Fault, Result};
-use sheetlight::recording::Recording;
+use crate::procedure::calibrate::JointOrder;
+use crate::web::message::{CalibrationFigures, Outcome};
+use sheetlight::fault::Result;
 use sheetlight::rig::{Quality, Rig};
-use sheetlight::scan::Where;
-use sheetlight::station::volume::asked;
-use sheetlight::station::{
-    JointResult, JointRun, Mounted, Settings, accept_joint, calibrate_joint, mount_of, store_joint,
-};
+use sheetlight::station::{JointResult, accept_joint, store_joint};
 use std::path::Path;
 
 /// The result that waits for acceptance, in the job's folder; it has the layout of a station's folder.
 const RESULT: &str = "result";
 
 pub(in crate::web::work) fn joint(this: &Run, order: &JointOrder) -> Result<Outcome> {
-    let place = &this.jobs.place;
-    if order.recordings.is_empty() {
-        return Err(Fault::usage("no recording was chosen").next("choose recordings of boards"));
-    }
-    let open = |name: &String| Recording::open(&resolve(&place.recordings, name)?);
-    let recordings = order.recordings.iter().map(open).collect::<Result<Vec<_>>>()?;
-    let (settings, rig) = (Settings::load(&place.station)?, Rig::load_camera(&place.station)?);
-    let mounted = mount_of(&place.station, &settings, None)?;
-    let run = run(&settings, &mounted);
-    let result = calibrate_joint(&recordings, &rig, &run, &|done, of| this.progress(done, Some(of)))?;
-    Ok(Outcome::Joint(Box::new(keep(this, &result, &mounted)?)))
+    let (result, remarks) = this.remarked(|at| order.solve(at, &|done, of| this.progress(done, Some(of))))?;
+    Ok(Outcome::Joint(Box::new(keep(this, &result, remarks)?)))
 }
 
-/// The solve with the station's settings.
-pub(super) fn run(settings: &Settings, mounted: &Mounted) -> JointRun {
-    JointRun::new(mounted.mount, asked(settings, None), &settings.extraction, Where::default())
-}
-
-/// Stores a result in the job's folder; returns its figures, and what was assumed.
-pub(super) fn keep(this: &Run, result: &JointResult, mounted: &Mounted) -> Result<CalibrationFigures> {
+/// Stores a result in the job's folder; returns its figures, with remarks among the reasons.
+pub(super) fn keep(this: &Run, result: &JointResult, remarks: Vec<String>) -> Result<CalibrationFigures> {
     let folder = this.folder.join(RESULT);
     sheetlight::files::make_folder(&folder)?;
     store_joint(&folder, result)?;
@@ -47,7 +28,7 @@ pub(super) fn keep(this: &Run, result: &JointResult, mounted: &Mounted) -> Resul
     Ok(CalibrationFigures {
         kind: "joint".into(),
         verdict: q.verdict.words().into(),
-        reasons: q.reasons.iter().chain(&mounted.assumed).cloned().collect(),
+        reasons: q.reasons.iter().cloned().chain(remarks).collect(),
         advice: q.advice.clone(),
         figures: q.figures.clone(),
         former: former.unwrap_or_default(),

@@ -16,10 +16,7 @@ const MOST = 15;
  * that ends it.
  */
 export async function batch(place, settings, problem) {
-  const [list, recipes] = [
-    await recordings((r) => r.beam !== "pointer" && !r.board),
-    await known(),
-  ];
+  const [list, recipes] = [await recordings("scan"), await known()];
   const chosen = new Set(list.slice(0, MOST).map((r) => r.name));
   let recipe = sessionStorage.getItem("recipe") ?? recipes[0]?.name ?? "";
   const shown = h("div", { class: "stack" });
@@ -68,7 +65,12 @@ export async function batch(place, settings, problem) {
       ),
       h(
         "button",
-        { class: "main", id: "run-batch", disabled: !list.length, onclick: run },
+        {
+          class: "main",
+          id: "run-batch",
+          disabled: !list.length,
+          onclick: run,
+        },
         t("Run batch"),
       ),
     ),
