@@ -2,6 +2,7 @@
 //! Frame and unit: px; grey levels of the pictures' depth.
 
 use super::{Image, Pixels};
+use rayon::prelude::*;
 
 /// Pixels that are bright in every picture while their neighbours are not. On the flank of a wide stripe, a hot pixel
 /// moves the centre of two dozen lines by a tenth of a pixel, in every shot of a flat surface. Sorted by rows from the
@@ -117,17 +118,24 @@ fn standing_out(image: &Image, over: u32) -> Vec<[u32; 2]> {
     if w < 3 || h < 3 {
         return Vec::new();
     }
-    let mut out = Vec::new();
-    for y in 1..h - 1 {
-        let row = (y * w) as usize;
-        let bright = |x: &usize| match &image.pixels {
-            Pixels::U8(p) => u32::from(p[row + x]) >= over,
-            Pixels::U16(p) => u32::from(p[row + x]) >= over,
+    let of_row = |y: u32| {
+        let row = (y * w) as usize..((y + 1) * w) as usize;
+        let columns: Vec<u32> = match &image.pixels {
+            Pixels::U8(p) => reaching(&p[row], over),
+            Pixels::U16(p) => reaching(&p[row], over),
         };
-        let those = (1..w as usize - 1).filter(bright).map(|x| [x as u32, y]);
-        out.extend(those.filter(|p| stands_out(image, *p, over)));
+        columns.into_iter().map(move |x| [x, y]).filter(|p| stands_out(image, *p, over)).collect::<Vec<_>>()
+    };
+    (1..h - 1).into_par_iter().with_min_len(64).flat_map_iter(of_row).collect()
+}
+
+/// Columns inside a row whose level is `over` or more. The largest level of a row is found many pixels at a time, and
+/// most rows have no light.
+fn reaching<T: Copy + Into<u32> + Ord>(row: &[T], over: u32) -> Vec<u32> {
+    if row.iter().copied().reduce(T::max).is_none_or(|most| most.into() < over) {
+        return Vec::new();
     }
-    out
+    (1..row.len() - 1).filter(|&x| row[x].into() >= over).map(|x| x as u32).collect()
 }
 
 /// True for a pixel that exceeds all its neighbours but one by `over` (hot pixels come in pairs). Its height above the

@@ -82,7 +82,7 @@ impl Seen {
             for (y, row) in (0..).zip(pixels.chunks(image.width as usize)) {
                 let lit = |p: &T| (*p).into() >= half;
                 // Most rows have no light; their largest level is found many pixels at a time.
-                if !row.iter().max().is_some_and(lit) {
+                if !row.iter().copied().reduce(T::max).is_some_and(|most| lit(&most)) {
                     continue;
                 }
                 if let (Some(a), Some(b)) = (row.iter().position(lit), row.iter().rposition(lit)) {
@@ -146,14 +146,17 @@ impl Seen {
 /// The number of pixels of each level.
 fn counts<T: Copy + Into<u16>>(full_scale: u16, pixels: &[T]) -> Vec<u32> {
     // Neighbours have mostly the same level, and an addition waits for the one before it in the same place. Four
-    // tables in turns take 7 ms where one took 26, in a dark picture of 4096x3072.
-    let mut tables = [(); 4].map(|()| vec![0u32; usize::from(full_scale) + 1]);
-    for four in pixels.chunks(4) {
-        tables.iter_mut().zip(four).for_each(|(table, &p)| table[usize::from(p.into())] += 1);
+    // tables in turns take 3.6 ms where one takes 9.5, in a dark picture of 4096x3072.
+    let [mut a, mut b, mut c, mut d] = [(); 4].map(|()| vec![0u32; usize::from(full_scale) + 1]);
+    let (fours, rest) = pixels.as_chunks::<4>();
+    for &[w, x, y, z] in fours {
+        a[usize::from(w.into())] += 1;
+        b[usize::from(x.into())] += 1;
+        c[usize::from(y.into())] += 1;
+        d[usize::from(z.into())] += 1;
     }
-    let [mut counts, others @ ..] = tables;
-    others.iter().for_each(|other| counts.iter_mut().zip(other).for_each(|(n, m)| *n += m));
-    counts
+    rest.iter().for_each(|&p| a[usize::from(p.into())] += 1);
+    (0..a.len()).map(|i| a[i] + b[i] + c[i] + d[i]).collect()
 }
 
 fn widen(range: &mut Option<[u32; 4]>, x: u32, y: u32) {

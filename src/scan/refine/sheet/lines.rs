@@ -35,7 +35,7 @@ const USUAL: f64 = 0.75;
 /// have no neighbours and stay.
 const HELD: u32 = 7;
 /// Lines whose neighbours are compared at once, on all processor cores.
-const TOGETHER: usize = 16;
+const TOGETHER: usize = 64;
 /// Points of a line at which its way to another is measured.
 const SAMPLES: usize = 64;
 
