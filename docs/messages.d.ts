@@ -1,52 +1,5 @@
 // Made from program/src/web/message by the test `messages`; SHEETLIGHT_WRITE=1 makes it again.
 
-export type Mode = "live" | "replay" | "simulated";
-
-export type RobotState = "no_link" | "read_only" | "armed" | "moving";
-
-export type Frames = { 
-/**
- * Passed to the processing stages.
- */
-seen: number, 
-/**
- * With at least one point.
- */
-measured: number, 
-/**
- * Frames without a result, by cause.
- */
-dropped: Record<string, number>, };
-
-export type CalibrationAge = { 
-/**
- * Days since the oldest record was measured.
- */
-days: number, 
-/**
- * The worst verdict of all records.
- */
-verdict: string, 
-/**
- * The record with that verdict.
- */
-worst: string, 
-/**
- * Root sum of squares of the errors that the records expect at the working distance, mm; null if one does not
- * state it.
- */
-expected_mm: number | null, };
-
-export type Lease = { 
-/**
- * A short name of the tab that holds the lease; null: no tab holds it.
- */
-holder: string | null, 
-/**
- * Seconds until the lease expires.
- */
-seconds_left: number, };
-
 export type Bar = { 
 /**
  * Source of the pictures.
@@ -113,6 +66,113 @@ running: string | null,
  */
 viewers: number, };
 
+export type CalibrationAge = { 
+/**
+ * Days since the oldest record was measured.
+ */
+days: number, 
+/**
+ * The worst verdict of all records.
+ */
+verdict: string, 
+/**
+ * The record with that verdict.
+ */
+worst: string, 
+/**
+ * Root sum of squares of the errors that the records expect at the working distance, mm; null if one does not
+ * state it.
+ */
+expected_mm: number | null, };
+
+export type Frames = { 
+/**
+ * Passed to the processing stages.
+ */
+seen: number, 
+/**
+ * With at least one point.
+ */
+measured: number, 
+/**
+ * Frames without a result, by cause.
+ */
+dropped: Record<string, number>, };
+
+export type Lease = { 
+/**
+ * A short name of the tab that holds the lease; null: no tab holds it.
+ */
+holder: string | null, 
+/**
+ * Seconds until the lease expires.
+ */
+seconds_left: number, };
+
+export type Mode = "live" | "replay" | "simulated";
+
+export type RobotState = "no_link" | "read_only" | "armed" | "moving";
+
+export type Event = { "event": "state", "data": { 
+/**
+ * The bar.
+ */
+bar: Bar, 
+/**
+ * Newest first, at most 200.
+ */
+jobs: Array<Job>, 
+/**
+ * The robot's state for motions.
+ */
+motion: MotionState, } } | { "event": "bar", "data": Bar } | { "event": "job", "data": Job } | { "event": "motion", "data": MotionState } | { "event": "gone", "data": string };
+
+export type Job = { 
+/**
+ * Version of job.json: 1.
+ */
+format: number, 
+/**
+ * Name of the job's folder, e.g. `0007-scan`.
+ */
+id: string, 
+/**
+ * What was ordered.
+ */
+order: Order, 
+/**
+ * State of the job.
+ */
+state: JobState, 
+/**
+ * Steps done (shots, pictures, checks).
+ */
+done: number, 
+/**
+ * Steps in total; null while unknown.
+ */
+of: number | null, 
+/**
+ * When it was ordered.
+ */
+created: string, 
+/**
+ * Run time, s.
+ */
+seconds: number, 
+/**
+ * Why it failed.
+ */
+problem: Problem | null, 
+/**
+ * The result.
+ */
+outcome: Outcome | null, 
+/**
+ * Steps of an interrupted run are stored: resuming continues from them.
+ */
+resumable: boolean, };
+
 export type JobState = "queued" | "running" | "done" | "failed" | "stopped" | "cut_off";
 
 export type Problem = { 
@@ -132,6 +192,63 @@ cause: string,
  * Next step; may be empty.
  */
 next: string, };
+
+export type AutoOrder = { 
+/**
+ * Name of the board's description in the station's folder `boards`.
+ */
+board: string, 
+/**
+ * The calibration ends when the expected error of a scanned point is at most this, mm rms.
+ */
+target_mm: number, 
+/**
+ * Most stops, 20 to 200; null: 40.
+ */
+most?: number | null, };
+
+export type BenchmarkOrder = { 
+/**
+ * Frame rate of the camera whose drops are counted, Hz; null: 30.
+ */
+rate_hz?: number | null, };
+
+export type FindOrder = { 
+/**
+ * Jobs that scanned.
+ */
+scans: Array<string>, 
+/**
+ * Name of the recipe.
+ */
+recipe: string, 
+/**
+ * Two positions in the first scan's map, mm: the tool goes to the middle of the pins there; null: to the point
+ * that the recipe names.
+ */
+pins?: [[number, number], [number, number]] | null, };
+
+export type InsertOrder = { 
+/**
+ * Name of the recipe.
+ */
+recipe: string, 
+/**
+ * Length of the sweep about the picture's middle, mm; null: the field's short side.
+ */
+sweep_mm?: number | null, 
+/**
+ * Speed of every motion, mm/s; null: the station's.
+ */
+speed_mm_s?: number | null, 
+/**
+ * After an interruption, retract instead of continuing.
+ */
+back_out: boolean, };
+
+export type Order = { "procedure": "check" } & Plain | { "procedure": "scan" } & ScanOrder | { "procedure": "filter" } & FilterOrder | { "procedure": "find" } & FindOrder | { "procedure": "teach" } & TeachOrder | { "procedure": "touch" } & TouchOrder | { "procedure": "tune" } & Plain | { "procedure": "calibrate" } & CalibrateOrder | { "procedure": "joint" } & JointOrder | { "procedure": "auto" } & AutoOrder | { "procedure": "insert" } & InsertOrder | { "procedure": "benchmark" } & BenchmarkOrder;
+
+export type Plain = Record<string, never>;
 
 export type TeachOrder = { 
 /**
@@ -175,8 +292,6 @@ approach_mm: number,
  */
 replace: boolean, };
 
-export type Plain = Record<string, never>;
-
 export type ScanOrder = { 
 /**
  * Recording folder with meta.json
@@ -193,7 +308,7 @@ channel?: string | null,
 /**
  * Picture with the laser off at the shots' exposure, to subtract: in the recording, or a path; once per exposure
  */
-ambient?: Array<string> | null, 
+ambient?: Array<string>, 
 /**
  * Use exposure N of a recording with several, 1 is the shortest, instead of merging all
  */
@@ -215,81 +330,6 @@ skip_bad: boolean,
  */
 settings: Record<string, unknown>, };
 
-export type Filter = { "filter": "sigma", 
-/**
- * Largest standard deviation, mm.
- */
-most_mm: number, } | { "filter": "heights", 
-/**
- * Lowest height, mm.
- */
-low_mm: number, 
-/**
- * Highest height, mm.
- */
-high_mm: number, } | { "filter": "cut", 
-/**
- * Two opposite corners: x0 y0 x1 y1, mm.
- */
-corners: [number, number, number, number], } | { "filter": "keep", 
-/**
- * Two opposite corners: x0 y0 x1 y1, mm.
- */
-corners: [number, number, number, number], } | { "filter": "islands", 
-/**
- * Pieces with fewer cells are removed.
- */
-least_cells: number, 
-/**
- * Neighbouring cells whose heights differ by more belong to different pieces, mm.
- */
-step_mm: number, };
-
-export type Filters = { 
-/**
- * In the order in which they are applied.
- */
-filters: Array<Filter>, };
-
-export type Filtered = { 
-/**
- * In the order in which they are applied.
- */
-filters: Array<Filter>, 
-/**
- * Number of cells that each filter removes.
- */
-cells: Array<number>, 
-/**
- * Number of cells that remain.
- */
-left: number, };
-
-export type FilterOrder = { 
-/**
- * The job that made the scan.
- */
-scan: string, 
-/**
- * In the order in which they are applied.
- */
-filters: Array<Filter>, };
-
-export type FindOrder = { 
-/**
- * Jobs that scanned.
- */
-scans: Array<string>, 
-/**
- * Name of the recipe.
- */
-recipe: string, 
-/**
- * Two positions in the first scan's map, mm: the tool goes to the middle of the pins there; null: to the point
- * that the recipe names.
- */
-pins?: [[number, number], [number, number]] | null, };
-
 export type TouchOrder = { 
 /**
  * Recording with a laser picture of the pointer's spot per frame
@@ -299,6 +339,22 @@ recording: string,
  * Pose file of the recording, without extension [default: the one in meta.json]
  */
 poses?: string | null, };
+
+export type AxisOrder = { 
+/**
+ * Recording of a board on the axis, with a picture and a count per frame
+ */
+recording: string, 
+/**
+ * Frames that are not used, counted from 0
+ */
+leave_out: Array<number>, 
+/**
+ * Channel of a colour picture: red, green, blue or luma
+ */
+channel?: string | null, };
+
+export type CalibrateOrder = { "target": "camera" } & CameraOrder | { "target": "hand_eye" } & HandEyeOrder | { "target": "laser_plane" } & LaserPlaneOrder | { "target": "pointer" } & PointerOrder | { "target": "axis" } & AxisOrder;
 
 export type CameraOrder = { 
 /**
@@ -383,6 +439,33 @@ working_mm?: number | null,
  */
 channel?: string | null, };
 
+export type JointOrder = { 
+/**
+ * Recordings of boards
+ */
+recordings: Array<string>, 
+/**
+ * Pose file of the recordings with robot poses, without extension [default: the one in meta.json]
+ */
+poses?: string | null, 
+/**
+ * Where the camera is: eye-in-hand (on the flange) or eye-to-hand (fixed) [default: the station's, else
+ * eye-in-hand with a note]
+ */
+mount?: string | null, 
+/**
+ * Nearest and farthest depth of the stated error, mm [default: the working volume, else where boards were lit]
+ */
+working_mm?: Array<number> | null, 
+/**
+ * Channel of a colour picture: red, green, blue or luma
+ */
+channel?: string | null, 
+/**
+ * Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
+ */
+on?: string | null, };
+
 export type LaserPlaneOrder = { 
 /**
  * Recording with an ambient and a laser picture per frame
@@ -431,88 +514,121 @@ far_mm?: number | null,
  */
 channel?: string | null, };
 
-export type AxisOrder = { 
+export type Filter = { "filter": "sigma", 
 /**
- * Recording of a board on the axis, with a picture and a count per frame
+ * Largest standard deviation, mm.
  */
-recording: string, 
+most_mm: number, } | { "filter": "heights", 
 /**
- * Frames that are not used, counted from 0
+ * Lowest height, mm.
  */
-leave_out: Array<number>, 
+low_mm: number, 
 /**
- * Channel of a colour picture: red, green, blue or luma
+ * Highest height, mm.
  */
-channel?: string | null, };
+high_mm: number, } | { "filter": "cut", 
+/**
+ * Two opposite corners: x0 y0 x1 y1, mm.
+ */
+corners: [number, number, number, number], } | { "filter": "keep", 
+/**
+ * Two opposite corners: x0 y0 x1 y1, mm.
+ */
+corners: [number, number, number, number], } | { "filter": "islands", 
+/**
+ * Pieces with fewer cells are removed.
+ */
+least_cells: number, 
+/**
+ * Neighbouring cells whose heights differ by more belong to different pieces, mm.
+ */
+step_mm: number, };
 
-export type CalibrateOrder = { "target": "camera" } & CameraOrder | { "target": "hand_eye" } & HandEyeOrder | { "target": "laser_plane" } & LaserPlaneOrder | { "target": "pointer" } & PointerOrder | { "target": "axis" } & AxisOrder;
+export type FilterOrder = { 
+/**
+ * The job that made the scan.
+ */
+scan: string, 
+/**
+ * In the order in which they are applied.
+ */
+filters: Array<Filter>, };
 
-export type JointOrder = { 
+export type Filtered = { 
 /**
- * Recordings of boards
+ * In the order in which they are applied.
  */
-recordings: Array<string>, 
+filters: Array<Filter>, 
 /**
- * Pose file of the recordings with robot poses, without extension [default: the one in meta.json]
+ * Number of cells that each filter removes.
  */
-poses?: string | null, 
+cells: Array<number>, 
 /**
- * Where the camera is: eye-in-hand (on the flange) or eye-to-hand (fixed) [default: the station's, else
- * eye-in-hand with a note]
+ * Number of cells that remain.
  */
-mount?: string | null, 
-/**
- * Nearest and farthest depth of the stated error, mm [default: the working volume, else where boards were lit]
- */
-working_mm?: Array<number> | null, 
-/**
- * Channel of a colour picture: red, green, blue or luma
- */
-channel?: string | null, 
-/**
- * Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
- */
-on?: string | null, };
+left: number, };
 
-export type AutoOrder = { 
+export type Filters = { 
 /**
- * Name of the board's description in the station's folder `boards`.
+ * In the order in which they are applied.
  */
-board: string, 
-/**
- * The calibration ends when the expected error of a scanned point is at most this, mm rms.
- */
-target_mm: number, 
-/**
- * Most stops, 20 to 200; null: 40.
- */
-most?: number | null, };
+filters: Array<Filter>, };
 
-export type InsertOrder = { 
+export type BenchRow = { 
 /**
- * Name of the recipe.
+ * Adapter or processor.
  */
-recipe: string, 
+on: string, 
 /**
- * Length of the sweep about the picture's middle, mm; null: the field's short side.
+ * Columns, px.
  */
-sweep_mm?: number | null, 
+width: number, 
 /**
- * Speed of every motion, mm/s; null: the station's.
+ * Rows, px.
  */
-speed_mm_s?: number | null, 
+height: number, 
 /**
- * After an interruption, retract instead of continuing.
+ * Time of the whole chain, ms.
  */
-back_out: boolean, };
+ms_per_shot: number, };
 
-export type BenchmarkOrder = { 
+export type CalibrationFigures = { 
 /**
- * Frame rate of the camera whose drops are counted, Hz; null: 30.
+ * Kind of calibration, as named in files.
  */
-rate_hz?: number | null, };
-
-export type Order = { "procedure": "check" } & Plain | { "procedure": "scan" } & ScanOrder | { "procedure": "filter" } & FilterOrder | { "procedure": "find" } & FindOrder | { "procedure": "teach" } & TeachOrder | { "procedure": "touch" } & TouchOrder | { "procedure": "tune" } & Plain | { "procedure": "calibrate" } & CalibrateOrder | { "procedure": "joint" } & JointOrder | { "procedure": "auto" } & AutoOrder | { "procedure": "insert" } & InsertOrder | { "procedure": "benchmark" } & BenchmarkOrder;
+kind: string, 
+/**
+ * good, usable, badly determined or refused.
+ */
+verdict: string, 
+/**
+ * Reasons for the verdict.
+ */
+reasons: Array<string>, 
+/**
+ * Advice for the next picture.
+ */
+advice: Array<string>, 
+/**
+ * Figures by name, with the unit in the name.
+ */
+figures: Record<string, number>, 
+/**
+ * The same figures of the station's present calibration; empty if there is none.
+ */
+former: Record<string, number>, 
+/**
+ * Residual of each picture; the page's heading states the unit.
+ */
+per_picture: Array<[string, number]>, 
+/**
+ * Excluded pictures: name and reason.
+ */
+left_out: Array<[string, string]>, 
+/**
+ * It was stored in the station.
+ */
+accepted: boolean, };
 
 export type CheckLine = { 
 /**
@@ -532,138 +648,6 @@ state: string,
  */
 says: string, };
 
-export type ScanFigures = { 
-/**
- * Shots processed, skipped ones included.
- */
-shots: number, 
-/**
- * Number of points in the cloud.
- */
-points: number, 
-/**
- * Columns of the pictures, px.
- */
-width: number, 
-/**
- * Rows, px.
- */
-height: number, 
-/**
- * Frame of the cloud: base, axis or flange.
- */
-frame: string, 
-/**
- * Median of the points' standard deviations, mm.
- */
-median_sigma_mm: number | null, 
-/**
- * Fraction of the map's cells that were measured.
- */
-coverage: number | null, 
-/**
- * Cell size, mm.
- */
-cell_mm: number | null, 
-/**
- * Range that contains 98 % of the map's heights, mm.
- */
-z_mm: [number, number] | null, 
-/**
- * Number of peaks by `fate`: kept, or the reason for rejection.
- */
-peaks: Record<string, number>, 
-/**
- * Number of shots without a point.
- */
-dark_shots: number, 
-/**
- * Skipped shots: name and reason.
- */
-skipped: Array<[string, string]>, 
-/**
- * Time from the first shot to the finished cloud, s.
- */
-seconds: number, 
-/**
- * Shots per second of this run.
- */
-shots_per_second: number, 
-/**
- * The adapter; or this machine's processor, and why.
- */
-ran_on: string, 
-/**
- * Seconds by activity of the main thread.
- */
-spent: Record<string, number>, 
-/**
- * What a reader must know.
- */
-remarks: Array<string>, };
-
-export type Notation = { 
-/**
- * Name of the convention.
- */
-name: string, 
-/**
- * One label per number, with its unit.
- */
-labels: Array<string>, 
-/**
- * In the order of the labels.
- */
-numbers: Array<number>, };
-
-export type RobotPoses = { 
-/**
- * Hash of all numbers here: a confirmation identifies the shown poses by it.
- */
-hash: string, 
-/**
- * The station's pose convention.
- */
-convention: string, 
-/**
- * One label per number, with its unit.
- */
-labels: Array<string>, 
-/**
- * Above the insertion.
- */
-approach: Array<number>, 
-/**
- * The inserted tool.
- */
-insertion: Array<number>, 
-/**
- * Above the insertion, on the way back.
- */
-retract: Array<number>, 
-/**
- * The insertion pose in every convention.
- */
-notations: Array<Notation>, };
-
-export type Term = { 
-/**
- * Name of the contribution.
- */
-name: string, 
-/**
- * Standard deviation along x, y, z of the part, mm; null if unknown.
- */
-sigma_mm: [number, number, number] | null, 
-/**
- * Standard deviation about these axes, degrees.
- */
-sigma_deg: [number, number, number] | null, 
-/**
- * Explanation.
- */
-note: string, };
-
 export type GateLight = { 
 /**
  * The judged quantity, with its unit.
@@ -681,6 +665,106 @@ limit: number,
  * The value keeps the limit.
  */
 passed: boolean, };
+
+export type Inserted = { 
+/**
+ * Time from the start to the confirmed position, s.
+ */
+time_to_position_s: number | null, 
+/**
+ * Number of confirmations until then.
+ */
+confirmations_to_position: number | null, 
+/**
+ * Total duration, work and waiting, s.
+ */
+seconds: number, 
+/**
+ * Number of confirmations in total.
+ */
+confirmations: number, 
+/**
+ * The found part; null if it was found before the program was restarted.
+ */
+found: Position | null, };
+
+export type KeptUp = { 
+/**
+ * Adapter or processor.
+ */
+on: string, 
+/**
+ * Columns, px.
+ */
+width: number, 
+/**
+ * Rows, px.
+ */
+height: number, 
+/**
+ * Frame rate at which pictures were sent, Hz.
+ */
+rate_hz: number, 
+/**
+ * Number of pictures sent.
+ */
+sent: number, 
+/**
+ * Number of these that have points.
+ */
+measured: number, 
+/**
+ * Skipped because a newer one had arrived.
+ */
+passed_over: number, 
+/**
+ * Lost for other reasons.
+ */
+lost: number, 
+/**
+ * Time from the last byte to the points, p50 and p99, ms.
+ */
+ms: [number, number], };
+
+export type Notation = { 
+/**
+ * Name of the convention.
+ */
+name: string, 
+/**
+ * One label per number, with its unit.
+ */
+labels: Array<string>, 
+/**
+ * In the order of the labels.
+ */
+numbers: Array<number>, };
+
+export type Outcome = { "procedure": "check", 
+/**
+ * In the order of the checks.
+ */
+lines: Array<CheckLine>, } | { "procedure": "scan" } & ScanFigures | { "procedure": "find" } & Position | { "procedure": "teach", 
+/**
+ * Name of the recipe.
+ */
+recipe: string, 
+/**
+ * Result of finding the part in that scan.
+ */
+proof: Position, } | { "procedure": "touch" } & Touched | { "procedure": "tune" } & ExposureSet | { "procedure": "calibrate" } & CalibrationFigures | { "procedure": "joint" } & CalibrationFigures | { "procedure": "auto" } & CalibrationFigures | { "procedure": "insert" } & Inserted | { "procedure": "benchmark", 
+/**
+ * One row per size and processor.
+ */
+rows: Array<BenchRow>, 
+/**
+ * Recorded rows of other machines.
+ */
+recorded: Array<BenchRow>, 
+/**
+ * Measured and dropped pictures of a camera, at half and at full resolution.
+ */
+kept_up: Array<KeptUp>, };
 
 export type Position = { 
 /**
@@ -756,31 +840,151 @@ outline: Array<Array<[number, number]>>,
  */
 notes: Array<string>, };
 
-export type SurfaceTouched = { 
+export type Repeats = { 
 /**
- * Unit normal towards the camera; base frame.
+ * Number of poses.
  */
-normal: [number, number, number], 
+places: number, 
 /**
- * Middle of the spots, base frame, mm.
+ * For x, y, z and rotation; empty for fewer than two poses.
  */
-centre_mm: [number, number, number], 
+along: Array<Spread>, };
+
+export type RepeatsAsk = { 
 /**
- * Standard deviation of its tilt: in the worst direction, and at right angles to it, degrees.
+ * Names of the jobs.
  */
-tilt_sigma_deg: [number, number], 
+jobs: Array<string>, };
+
+export type RobotPoses = { 
 /**
- * Distance of the spots from the plane, rms, mm.
+ * Hash of all numbers here: a confirmation identifies the shown poses by it.
  */
-rms_mm: number, 
+hash: string, 
 /**
- * Angle between its normal and the base's z axis, degrees.
+ * The station's pose convention.
  */
-tilt_deg: number, 
+convention: string, 
 /**
- * A spot that was excluded because it does not lie on the plane of the others.
+ * One label per number, with its unit.
  */
-left_out: string | null, };
+labels: Array<string>, 
+/**
+ * Above the insertion.
+ */
+approach: Array<number>, 
+/**
+ * The inserted tool.
+ */
+insertion: Array<number>, 
+/**
+ * Above the insertion, on the way back.
+ */
+retract: Array<number>, 
+/**
+ * The insertion pose in every convention.
+ */
+notations: Array<Notation>, };
+
+export type ScanFigures = { 
+/**
+ * Shots processed, skipped ones included.
+ */
+shots: number, 
+/**
+ * Number of points in the cloud.
+ */
+points: number, 
+/**
+ * Columns of the pictures, px.
+ */
+width: number, 
+/**
+ * Rows, px.
+ */
+height: number, 
+/**
+ * Frame of the cloud: base, axis or flange.
+ */
+frame: string, 
+/**
+ * Median of the points' standard deviations, mm.
+ */
+median_sigma_mm: number | null, 
+/**
+ * Fraction of the map's cells that were measured.
+ */
+coverage: number | null, 
+/**
+ * Cell size, mm.
+ */
+cell_mm: number | null, 
+/**
+ * Range that contains 98 % of the map's heights, mm.
+ */
+z_mm: [number, number] | null, 
+/**
+ * Number of peaks by `fate`: kept, or the reason for rejection.
+ */
+peaks: Record<string, number>, 
+/**
+ * Number of shots without a point.
+ */
+dark_shots: number, 
+/**
+ * Skipped shots: name and reason.
+ */
+skipped: Array<[string, string]>, 
+/**
+ * Time from the first shot to the finished cloud, s.
+ */
+seconds: number, 
+/**
+ * Shots per second of this run.
+ */
+shots_per_second: number, 
+/**
+ * The adapter; or this machine's processor, and why.
+ */
+ran_on: string, 
+/**
+ * Seconds by activity of the main thread.
+ */
+spent: Record<string, number>, 
+/**
+ * What a reader must know.
+ */
+remarks: Array<string>, };
+
+export type Spread = { 
+/**
+ * x, y, z of the frame, or turn.
+ */
+name: string, 
+/**
+ * mm or degrees.
+ */
+unit: string, 
+/**
+ * Standard deviation of the poses.
+ */
+scatter: number, 
+/**
+ * Root mean square of the standard deviations that the poses state.
+ */
+stated: number, 
+/**
+ * Range from the lowest to the highest value.
+ */
+apart: number, 
+/**
+ * Half width of the histogram, centred on the median.
+ */
+half: number, 
+/**
+ * Number of poses in each bar of the histogram.
+ */
+bars: Array<number>, };
 
 export type SquareProposed = { 
 /**
@@ -808,6 +1012,50 @@ flange: Array<number>,
  */
 tool: Array<number>, };
 
+export type SurfaceTouched = { 
+/**
+ * Unit normal towards the camera; base frame.
+ */
+normal: [number, number, number], 
+/**
+ * Middle of the spots, base frame, mm.
+ */
+centre_mm: [number, number, number], 
+/**
+ * Standard deviation of its tilt: in the worst direction, and at right angles to it, degrees.
+ */
+tilt_sigma_deg: [number, number], 
+/**
+ * Distance of the spots from the plane, rms, mm.
+ */
+rms_mm: number, 
+/**
+ * Angle between its normal and the base's z axis, degrees.
+ */
+tilt_deg: number, 
+/**
+ * A spot that was excluded because it does not lie on the plane of the others.
+ */
+left_out: string | null, };
+
+export type Term = { 
+/**
+ * Name of the contribution.
+ */
+name: string, 
+/**
+ * Standard deviation along x, y, z of the part, mm; null if unknown.
+ */
+sigma_mm: [number, number, number] | null, 
+/**
+ * Standard deviation about these axes, degrees.
+ */
+sigma_deg: [number, number, number] | null, 
+/**
+ * Explanation.
+ */
+note: string, };
+
 export type Touched = { 
 /**
  * For each spot: picture, distance from the camera along its axis and its standard deviation, mm.
@@ -830,65 +1078,79 @@ missing: Array<[string, string]>,
  */
 remarks: Array<string>, };
 
-export type CalibrationFigures = { 
+export type CameraFeature = { 
 /**
- * Kind of calibration, as named in files.
+ * Name of the feature by the standard naming convention.
  */
-kind: string, 
+name: string, 
 /**
- * good, usable, badly determined or refused.
+ * Current value; null if it cannot be read.
  */
-verdict: string, 
+value: number | boolean | string | null, 
 /**
- * Reasons for the verdict.
+ * us, dB, px, Hz; empty if it has none.
  */
-reasons: Array<string>, 
+unit: string, 
 /**
- * Advice for the next picture.
+ * Lowest and highest value; null: unknown.
  */
-advice: Array<string>, 
+range: [number, number] | null, 
 /**
- * Figures by name, with the unit in the name.
+ * The allowed values; empty if the feature is not an enumeration.
  */
-figures: Record<string, number>, 
+words: Array<string>, 
 /**
- * The same figures of the station's present calibration; empty if there is none.
+ * Whether it can be set now.
  */
-former: Record<string, number>, 
-/**
- * Residual of each picture; the page's heading states the unit.
- */
-per_picture: Array<[string, number]>, 
-/**
- * Excluded pictures: name and reason.
- */
-left_out: Array<[string, string]>, 
-/**
- * It was stored in the station.
- */
-accepted: boolean, };
+writable: boolean, };
 
-export type Inserted = { 
+export type CameraState = { 
 /**
- * Time from the start to the confirmed position, s.
+ * Its settings; empty if it has none, or while it is not connected.
  */
-time_to_position_s: number | null, 
+features: Array<CameraFeature>, };
+
+export type ExposureSet = { 
 /**
- * Number of confirmations until then.
+ * The exposure that was set, us.
  */
-confirmations_to_position: number | null, 
+exposure_us: number, 
 /**
- * Total duration, work and waiting, s.
+ * Exposures tried: us, and the level of the stripe's peaks, fraction of full scale; null: no stripe.
  */
-seconds: number, 
+tried: Array<[number, number | null]>, 
 /**
- * Number of confirmations in total.
+ * Measures of the pictures now.
  */
-confirmations: number, 
+look: PictureLook, 
 /**
- * The found part; null if it was found before the program was restarted.
+ * If no exposure is quite right: why this one is the best.
  */
-found: Position | null, };
+remark: string | null, };
+
+export type PictureLook = { 
+/**
+ * Lowest, median, 99th percentile and highest grey level.
+ */
+levels: [number, number, number, number], 
+/**
+ * Fraction of saturated pixels.
+ */
+saturated: number, 
+/**
+ * Null if no stripe is visible.
+ */
+stripe: StripeSeen | null, };
+
+export type SetFeature = { 
+/**
+ * Name of the feature by the standard naming convention, e.g. ExposureTime.
+ */
+name: string, 
+/**
+ * The value as text.
+ */
+value: string, };
 
 export type StripeSeen = { 
 /**
@@ -929,207 +1191,11 @@ right: boolean,
  */
 pieces: Array<[number, number, number, number]>, };
 
-export type PictureLook = { 
+export type Arming = { 
 /**
- * Lowest, median, 99th percentile and highest grey level.
+ * False: disarms it.
  */
-levels: [number, number, number, number], 
-/**
- * Fraction of saturated pixels.
- */
-saturated: number, 
-/**
- * Null if no stripe is visible.
- */
-stripe: StripeSeen | null, };
-
-export type ExposureSet = { 
-/**
- * The exposure that was set, us.
- */
-exposure_us: number, 
-/**
- * Exposures tried: us, and the level of the stripe's peaks, fraction of full scale; null: no stripe.
- */
-tried: Array<[number, number | null]>, 
-/**
- * Measures of the pictures now.
- */
-look: PictureLook, 
-/**
- * If no exposure is quite right: why this one is the best.
- */
-remark: string | null, };
-
-export type CameraFeature = { 
-/**
- * Name of the feature by the standard naming convention.
- */
-name: string, 
-/**
- * Current value; null if it cannot be read.
- */
-value: number | boolean | string | null, 
-/**
- * us, dB, px, Hz; empty if it has none.
- */
-unit: string, 
-/**
- * Lowest and highest value; null: unknown.
- */
-range: [number, number] | null, 
-/**
- * The allowed values; empty if the feature is not an enumeration.
- */
-words: Array<string>, 
-/**
- * Whether it can be set now.
- */
-writable: boolean, };
-
-export type CameraState = { 
-/**
- * Its settings; empty if it has none, or while it is not connected.
- */
-features: Array<CameraFeature>, };
-
-export type SetFeature = { 
-/**
- * Name of the feature by the standard naming convention, e.g. ExposureTime.
- */
-name: string, 
-/**
- * The value as text.
- */
-value: string, };
-
-export type BenchRow = { 
-/**
- * Adapter or processor.
- */
-on: string, 
-/**
- * Columns, px.
- */
-width: number, 
-/**
- * Rows, px.
- */
-height: number, 
-/**
- * Time of the whole chain, ms.
- */
-ms_per_shot: number, };
-
-export type KeptUp = { 
-/**
- * Adapter or processor.
- */
-on: string, 
-/**
- * Columns, px.
- */
-width: number, 
-/**
- * Rows, px.
- */
-height: number, 
-/**
- * Frame rate at which pictures were sent, Hz.
- */
-rate_hz: number, 
-/**
- * Number of pictures sent.
- */
-sent: number, 
-/**
- * Number of these that have points.
- */
-measured: number, 
-/**
- * Skipped because a newer one had arrived.
- */
-passed_over: number, 
-/**
- * Lost for other reasons.
- */
-lost: number, 
-/**
- * Time from the last byte to the points, p50 and p99, ms.
- */
-ms: [number, number], };
-
-export type Outcome = { "procedure": "check", 
-/**
- * In the order of the checks.
- */
-lines: Array<CheckLine>, } | { "procedure": "scan" } & ScanFigures | { "procedure": "find" } & Position | { "procedure": "teach", 
-/**
- * Name of the recipe.
- */
-recipe: string, 
-/**
- * Result of finding the part in that scan.
- */
-proof: Position, } | { "procedure": "touch" } & Touched | { "procedure": "tune" } & ExposureSet | { "procedure": "calibrate" } & CalibrationFigures | { "procedure": "joint" } & CalibrationFigures | { "procedure": "auto" } & CalibrationFigures | { "procedure": "insert" } & Inserted | { "procedure": "benchmark", 
-/**
- * One row per size and processor.
- */
-rows: Array<BenchRow>, 
-/**
- * Recorded rows of other machines.
- */
-recorded: Array<BenchRow>, 
-/**
- * Measured and dropped pictures of a camera, at half and at full resolution.
- */
-kept_up: Array<KeptUp>, };
-
-export type Job = { 
-/**
- * Version of job.json: 1.
- */
-format: number, 
-/**
- * Name of the job's folder, e.g. `0007-scan`.
- */
-id: string, 
-/**
- * What was ordered.
- */
-order: Order, 
-/**
- * State of the job.
- */
-state: JobState, 
-/**
- * Steps done (shots, pictures, checks).
- */
-done: number, 
-/**
- * Steps in total; null while unknown.
- */
-of: number | null, 
-/**
- * When it was ordered.
- */
-created: string, 
-/**
- * Run time, s.
- */
-seconds: number, 
-/**
- * Why it failed.
- */
-problem: Problem | null, 
-/**
- * The result.
- */
-outcome: Outcome | null, 
-/**
- * Steps of an interrupted run are stored: resuming continues from them.
- */
-resumable: boolean, };
+armed: boolean, };
 
 export type Asked = { 
 /**
@@ -1185,17 +1251,13 @@ stays_down: boolean,
  */
 within_s: number, };
 
-export type SimulatedCell = { 
+export type InTheCell = { 
 /**
- * Parts that have a component for the gripper.
+ * Puts the component of this part into the gripper; null: the gripper keeps its component.
  */
-parts: Array<string>, 
+holds?: string | null, 
 /**
- * The part whose component the gripper holds.
- */
-holds: string, 
-/**
- * True: the arm is over the calibration board; false: over the part.
+ * Jogs the arm over the calibration board; false: over the part.
  */
 over_board: boolean, };
 
@@ -1245,57 +1307,19 @@ expected: Array<[number, number]>,
  */
 simulated: SimulatedCell | null, };
 
-export type Arming = { 
+export type SimulatedCell = { 
 /**
- * False: disarms it.
+ * Parts that have a component for the gripper.
  */
-armed: boolean, };
-
-export type InTheCell = { 
+parts: Array<string>, 
 /**
- * Puts the component of this part into the gripper; null: the gripper keeps its component.
+ * The part whose component the gripper holds.
  */
-holds?: string | null, 
+holds: string, 
 /**
- * Jogs the arm over the calibration board; false: over the part.
+ * True: the arm is over the calibration board; false: over the part.
  */
 over_board: boolean, };
-
-export type Event = { "event": "state", "data": { 
-/**
- * The bar.
- */
-bar: Bar, 
-/**
- * Newest first, at most 200.
- */
-jobs: Array<Job>, 
-/**
- * The robot's state for motions.
- */
-motion: MotionState, } } | { "event": "bar", "data": Bar } | { "event": "job", "data": Job } | { "event": "motion", "data": MotionState } | { "event": "gone", "data": string };
-
-export type Knock = { 
-/**
- * The token of this program start.
- */
-token: string | null, 
-/**
- * The password, if the screen is served to other machines.
- */
-password: string | null, };
-
-export type Session = { 
-/**
- * A short name of the tab that sent the request.
- */
-tab: string, };
-
-export type TakeLease = { 
-/**
- * Takes it even if another tab operates.
- */
-firmly: boolean, };
 
 export type Confirmed = { 
 /**
@@ -1313,6 +1337,16 @@ export type Grant = {
  */
 grant: string, };
 
+export type Knock = { 
+/**
+ * The token of this program start.
+ */
+token: string | null, 
+/**
+ * The password, if the screen is served to other machines.
+ */
+password: string | null, };
+
 export type Redeem = { 
 /**
  * The grant that pressing the button returned.
@@ -1322,6 +1356,50 @@ grant: string,
  * The confirmed motion again.
  */
 what: Confirmed, };
+
+export type Session = { 
+/**
+ * A short name of the tab that sent the request.
+ */
+tab: string, };
+
+export type TakeLease = { 
+/**
+ * Takes it even if another tab operates.
+ */
+firmly: boolean, };
+
+export type BoardView = { 
+/**
+ * Name of the picture.
+ */
+name: string, 
+/**
+ * Its file in the job's folder.
+ */
+file: string, 
+/**
+ * Columns, px.
+ */
+width: number, 
+/**
+ * Rows, px.
+ */
+height: number, 
+/**
+ * The detected corners, u and v, px.
+ */
+corners: Array<[number, number]>, 
+/**
+ * Tilt of the board's normal from the camera's axis, to the right and downwards in the picture, degrees. Uses
+ * the station's camera, or else a focal length equal to the picture's width in px. Null if too little of the
+ * board was found.
+ */
+lean_deg: [number, number] | null, 
+/**
+ * Position of the axis that carries the board, counts; null without an axis, or if unknown.
+ */
+count: number | null, };
 
 export type CalibrationState = { 
 /**
@@ -1366,6 +1444,98 @@ labels: Array<string>,
  * mm, degrees, or units of the convention.
  */
 numbers: Array<number>, };
+
+export type PictureRef = { 
+/**
+ * The recording.
+ */
+recording: string, 
+/**
+ * Frame number, counted from 0.
+ */
+frame: number, 
+/**
+ * laser or ambient; null: whichever exists.
+ */
+light: string | null, 
+/**
+ * Columns of the answer, 16 to 4096; null: as the picture.
+ */
+width: number | null, };
+
+export type RecipeAsk = { 
+/**
+ * TOML.
+ */
+text: string, 
+/**
+ * Replaces the station's recipe of that name.
+ */
+replace: boolean, };
+
+export type RecipeText = { 
+/**
+ * Name of the file, without extension.
+ */
+name: string, 
+/**
+ * Name of the part for people; read from the text.
+ */
+title: string, 
+/**
+ * The recipe ships with the program; it is copied when it is changed.
+ */
+shipped: boolean, 
+/**
+ * TOML; empty if the file cannot be read at all.
+ */
+text: string, 
+/**
+ * What is wrong with it; null: nothing.
+ */
+problem: Problem | null, };
+
+export type RecordingInfo = { 
+/**
+ * Path below the recordings' folder.
+ */
+name: string, 
+/**
+ * The name stated in its meta.json.
+ */
+set: string, 
+/**
+ * Number of frames.
+ */
+frames: number, 
+/**
+ * Columns of its pictures, px.
+ */
+width: number, 
+/**
+ * Rows, px.
+ */
+height: number, 
+/**
+ * line or pointer; null if no laser is on.
+ */
+beam: string | null, 
+/**
+ * It shows a calibration board.
+ */
+board: boolean, 
+/**
+ * robot, linear or turntable.
+ */
+motion: string, 
+/**
+ * The procedures that it suits: scan, touch, joint, or targets of a calibration.
+ */
+suits: Array<string>, 
+/**
+ * Why it cannot be used; null: it can.
+ */
+problem: Problem | null, };
 
 export type StationInfo = { 
 /**
@@ -1416,6 +1586,22 @@ problem: Problem | null,
  * Dotted names of all extraction settings, with the station's values.
  */
 extraction: Record<string, unknown>, };
+
+export type SupportAsk = { 
+/**
+ * A person ticked the option.
+ */
+pictures: boolean, };
+
+export type ViewRef = { 
+/**
+ * The recording.
+ */
+recording: string, 
+/**
+ * Frame number, counted from 0.
+ */
+frame: number, };
 
 export type BackupInfo = { 
 /**
@@ -1469,6 +1655,26 @@ rate_hz: number,
  */
 last_error: string | null, };
 
+export type OutputAsk = { 
+/**
+ * line, pointer or room: on for a moment; open or close: the gripper.
+ */
+output: string, };
+
+export type SettingsAsk = { 
+/**
+ * SHA-256 of the text that this change was made from.
+ */
+sha256: string, 
+/**
+ * A new station.toml.
+ */
+text?: string | null, 
+/**
+ * Settings by their dotted names; null removes one. Comments and all other settings stay.
+ */
+changes: Record<string, unknown>, };
+
 export type SettingsState = { 
 /**
  * The text of station.toml.
@@ -1506,242 +1712,6 @@ connections: Array<Connection>,
  * Newest first.
  */
 backups: Array<BackupInfo>, };
-
-export type SettingsAsk = { 
-/**
- * SHA-256 of the text that this change was made from.
- */
-sha256: string, 
-/**
- * A new station.toml.
- */
-text?: string | null, 
-/**
- * Settings by their dotted names; null removes one. Comments and all other settings stay.
- */
-changes: Record<string, unknown>, };
-
-export type OutputAsk = { 
-/**
- * line, pointer or room: on for a moment; open or close: the gripper.
- */
-output: string, };
-
-export type RecordingInfo = { 
-/**
- * Path below the recordings' folder.
- */
-name: string, 
-/**
- * The name stated in its meta.json.
- */
-set: string, 
-/**
- * Number of frames.
- */
-frames: number, 
-/**
- * Columns of its pictures, px.
- */
-width: number, 
-/**
- * Rows, px.
- */
-height: number, 
-/**
- * line or pointer; null if no laser is on.
- */
-beam: string | null, 
-/**
- * It shows a calibration board.
- */
-board: boolean, 
-/**
- * robot, linear or turntable.
- */
-motion: string, 
-/**
- * The procedures that it suits: scan, touch, joint, or targets of a calibration.
- */
-suits: Array<string>, 
-/**
- * Why it cannot be used; null: it can.
- */
-problem: Problem | null, };
-
-export type BoardView = { 
-/**
- * Name of the picture.
- */
-name: string, 
-/**
- * Its file in the job's folder.
- */
-file: string, 
-/**
- * Columns, px.
- */
-width: number, 
-/**
- * Rows, px.
- */
-height: number, 
-/**
- * The detected corners, u and v, px.
- */
-corners: Array<[number, number]>, 
-/**
- * Tilt of the board's normal from the camera's axis, to the right and downwards in the picture, degrees. Uses
- * the station's camera, or else a focal length equal to the picture's width in px. Null if too little of the
- * board was found.
- */
-lean_deg: [number, number] | null, 
-/**
- * Position of the axis that carries the board, counts; null without an axis, or if unknown.
- */
-count: number | null, };
-
-export type ViewRef = { 
-/**
- * The recording.
- */
-recording: string, 
-/**
- * Frame number, counted from 0.
- */
-frame: number, };
-
-export type SupportAsk = { 
-/**
- * A person ticked the option.
- */
-pictures: boolean, };
-
-export type PictureRef = { 
-/**
- * The recording.
- */
-recording: string, 
-/**
- * Frame number, counted from 0.
- */
-frame: number, 
-/**
- * laser or ambient; null: whichever exists.
- */
-light: string | null, 
-/**
- * Columns of the answer, 16 to 4096; null: as the picture.
- */
-width: number | null, };
-
-export type RecipeText = { 
-/**
- * Name of the file, without extension.
- */
-name: string, 
-/**
- * Name of the part for people; read from the text.
- */
-title: string, 
-/**
- * The recipe ships with the program; it is copied when it is changed.
- */
-shipped: boolean, 
-/**
- * TOML; empty if the file cannot be read at all.
- */
-text: string, 
-/**
- * What is wrong with it; null: nothing.
- */
-problem: Problem | null, };
-
-export type RecipeAsk = { 
-/**
- * TOML.
- */
-text: string, 
-/**
- * Replaces the station's recipe of that name.
- */
-replace: boolean, };
-
-export type PointsOf = { 
-/**
- * TOML.
- */
-text: string, };
-
-export type RecipePoint = { 
-/**
- * The name by which constructions and the insertion refer to it.
- */
-name: string, 
-/**
- * Position in the part's frame, as drawn, mm.
- */
-at: [number, number], 
-/**
- * shape, grid, or the kind of construction: midpoint, line, intersection, offset, lattice.
- */
-kind: string, 
-/**
- * The tool goes to this point.
- */
-chosen: boolean, };
-
-export type NewPoint = { 
-/**
- * The name by which later points and the insertion refer to it.
- */
-name: string, 
-/**
- * midpoint, line, intersection, offset or lattice.
- */
-kind: string, 
-/**
- * Names of shapes, or of earlier points.
- */
-of: Array<string>, 
-/**
- * For an offset: the line or lattice that gives the direction.
- */
-along?: string | null, 
-/**
- * For an offset: distance along and across that direction, mm.
- */
-by_mm?: [number, number] | null, };
-
-export type PointChange = { "add": NewPoint } | { "take_out": { 
-/**
- * Name of the point.
- */
-name: string, } } | { "choose": { 
-/**
- * Name of the point; null: the part's datum.
- */
-name: string | null, } };
-
-export type PointsChange = { 
-/**
- * TOML; it need not be stored.
- */
-text: string, 
-/**
- * The change.
- */
-change: PointChange, };
-
-export type PointsChanged = { 
-/**
- * TOML, with all its comments.
- */
-text: string, 
-/**
- * Its points after the change.
- */
-points: Array<RecipePoint>, };
 
 export type DrawingAsk = { 
 /**
@@ -1803,88 +1773,81 @@ size_mm: [number, number],
  */
 notes: Array<string>, };
 
-export type MapHead = { 
+export type NewPoint = { 
 /**
- * Columns.
+ * The name by which later points and the insertion refer to it.
  */
-width: number, 
+name: string, 
 /**
- * Rows.
+ * midpoint, line, intersection, offset or lattice.
  */
-height: number, 
+kind: string, 
 /**
- * Cell size, mm; the centre of cell (i, j) is at ((i + 0.5) cell, (j + 0.5) cell).
+ * Names of shapes, or of earlier points.
  */
-cell_mm: number, 
+of: Array<string>, 
 /**
- * Pose of the grid in the cloud's frame: row-major 4x4, mm.
+ * For an offset: the line or lattice that gives the direction.
  */
-base_from_grid: [number, number, number, number, number, number, number, number, number, number, number, number, number, number, number, number], 
+along?: string | null, 
 /**
- * Range that contains 99 % of the heights, mm.
+ * For an offset: distance along and across that direction, mm.
  */
-z_mm: [number, number], 
-/**
- * The same for the standard deviation, mm.
- */
-sigma_mm: [number, number], 
-/**
- * The same for the stripe's amplitude, grey levels.
- */
-intensity: [number, number], };
+by_mm?: [number, number] | null, };
 
-export type Outlines = { 
+export type PointChange = { "add": NewPoint } | { "take_out": { 
 /**
- * Frame of the scan: base, axis, flange or map.
+ * Name of the point.
  */
-frame: string, 
+name: string, } } | { "choose": { 
 /**
- * One line per shape, x y z in that frame, mm; closed lines end at their first point.
+ * Name of the point; null: the part's datum.
  */
-lines: Array<Array<[number, number, number]>>, };
+name: string | null, } };
 
-export type Ghost = { 
+export type PointsChange = { 
 /**
- * Number of the picture that they belong to.
+ * TOML; it need not be stored.
  */
-number: number, 
+text: string, 
 /**
- * u and v, px; lines end where they leave the lens's field of view.
+ * The change.
  */
-lines: Array<Array<[number, number]>>, 
-/**
- * How far the arm's motion between the pose readings before and after the picture shifts the outlines, px; 0:
- * the arm stood still.
- */
-moved_px: number, };
+change: PointChange, };
 
-export type SectionAsk = { 
+export type PointsChanged = { 
 /**
- * Start, mm.
+ * TOML, with all its comments.
  */
-from: [number, number], 
+text: string, 
 /**
- * End, mm.
+ * Its points after the change.
  */
-to: [number, number], 
-/**
- * Pieces of the section to which lines are fitted: start and end along the section, mm; at most two.
- */
-fits: Array<[number, number]>, };
+points: Array<RecipePoint>, };
 
-export type SectionPoint = { 
+export type PointsOf = { 
 /**
- * Distance along the section, mm.
+ * TOML.
  */
-s: number, 
+text: string, };
+
+export type RecipePoint = { 
 /**
- * Height, mm; null if nothing was measured.
+ * The name by which constructions and the insertion refer to it.
  */
-z: number | null, 
+name: string, 
 /**
- * Its standard deviation, mm.
+ * Position in the part's frame, as drawn, mm.
  */
-sigma: number | null, };
+at: [number, number], 
+/**
+ * shape, grid, or the kind of construction: midpoint, line, intersection, offset, lattice.
+ */
+kind: string, 
+/**
+ * The tool goes to this point.
+ */
+chosen: boolean, };
 
 export type Distance = { 
 /**
@@ -1926,47 +1889,50 @@ rms_mm: number,
  */
 places: number, };
 
-export type Section = { 
+export type Ghost = { 
 /**
- * Its length, mm.
+ * Number of the picture that they belong to.
  */
-length_mm: number, 
+number: number, 
 /**
- * One point per half cell.
+ * u and v, px; lines end where they leave the lens's field of view.
  */
-points: Array<SectionPoint>, 
+lines: Array<Array<[number, number]>>, 
 /**
- * One fit per piece.
+ * How far the arm's motion between the pose readings before and after the picture shifts the outlines, px; 0:
+ * the arm stood still.
  */
-fits: Array<Fit>, 
-/**
- * Height of the second piece's middle above the first piece's line, mm; only with two pieces.
- */
-step: Distance | null, 
-/**
- * Angle between the two lines, degrees.
- */
-angle: Distance | null, };
+moved_px: number, };
 
-export type PointsAsk = { 
+export type MapHead = { 
 /**
- * First point, mm in the grid.
+ * Columns.
  */
-a: [number, number], 
+width: number, 
 /**
- * Second point, mm in the grid.
+ * Rows.
  */
-b: [number, number], };
-
-export type PlaneAsk = { 
+height: number, 
 /**
- * The point, mm in the grid.
+ * Cell size, mm; the centre of cell (i, j) is at ((i + 0.5) cell, (j + 0.5) cell).
  */
-point: [number, number], 
+cell_mm: number, 
 /**
- * Corners of the box to whose surface the plane is fitted: x0 y0 x1 y1, mm in the grid.
+ * Pose of the grid in the cloud's frame: row-major 4x4, mm.
  */
-plane: [number, number, number, number], };
+base_from_grid: [number, number, number, number, number, number, number, number, number, number, number, number, number, number, number, number], 
+/**
+ * Range that contains 99 % of the heights, mm.
+ */
+z_mm: [number, number], 
+/**
+ * The same for the standard deviation, mm.
+ */
+sigma_mm: [number, number], 
+/**
+ * The same for the stripe's amplitude, grey levels.
+ */
+intensity: [number, number], };
 
 export type Measure = { "measure": "two_points" } & PointsAsk | { "measure": "point_to_plane" } & PlaneAsk;
 
@@ -1992,35 +1958,85 @@ rms_mm: number | null,
  */
 cells: number, };
 
-export type SweepAsk = { 
+export type Outlines = { 
 /**
- * Name of the recipe.
+ * Frame of the scan: base, axis, flange or map.
  */
-recipe: string, 
+frame: string, 
 /**
- * Name of an insertion job that has already touched the board.
+ * One line per shape, x y z in that frame, mm; closed lines end at their first point.
  */
-job?: string | null, 
+lines: Array<Array<[number, number, number]>>, };
+
+export type PlaneAsk = { 
 /**
- * Distance from the camera to the board, mm, before it was touched.
+ * The point, mm in the grid.
  */
-distance_mm?: number | null, 
+point: [number, number], 
 /**
- * Length of the sweep, mm.
+ * Corners of the box to whose surface the plane is fitted: x0 y0 x1 y1, mm in the grid.
  */
-sweep_mm?: number | null, 
+plane: [number, number, number, number], };
+
+export type PointsAsk = { 
 /**
- * Distance between shots, mm.
+ * First point, mm in the grid.
  */
-step_mm?: number | null, 
+a: [number, number], 
 /**
- * Speed, mm/s; null: the highest that camera, chain and station allow.
+ * Second point, mm in the grid.
  */
-speed_mm_s?: number | null, 
+b: [number, number], };
+
+export type Section = { 
 /**
- * Frame rate of another camera than the connected one, Hz.
+ * Its length, mm.
  */
-camera_hz?: number | null, };
+length_mm: number, 
+/**
+ * One point per half cell.
+ */
+points: Array<SectionPoint>, 
+/**
+ * One fit per piece.
+ */
+fits: Array<Fit>, 
+/**
+ * Height of the second piece's middle above the first piece's line, mm; only with two pieces.
+ */
+step: Distance | null, 
+/**
+ * Angle between the two lines, degrees.
+ */
+angle: Distance | null, };
+
+export type SectionAsk = { 
+/**
+ * Start, mm.
+ */
+from: [number, number], 
+/**
+ * End, mm.
+ */
+to: [number, number], 
+/**
+ * Pieces of the section to which lines are fitted: start and end along the section, mm; at most two.
+ */
+fits: Array<[number, number]>, };
+
+export type SectionPoint = { 
+/**
+ * Distance along the section, mm.
+ */
+s: number, 
+/**
+ * Height, mm; null if nothing was measured.
+ */
+z: number | null, 
+/**
+ * Its standard deviation, mm.
+ */
+sigma: number | null, };
 
 export type Pace = { 
 /**
@@ -2051,6 +2067,36 @@ bears: Array<[string, number]>,
  * The step that results at this speed, mm.
  */
 left_step_mm: number, };
+
+export type SweepAsk = { 
+/**
+ * Name of the recipe.
+ */
+recipe: string, 
+/**
+ * Name of an insertion job that has already touched the board.
+ */
+job?: string | null, 
+/**
+ * Distance from the camera to the board, mm, before it was touched.
+ */
+distance_mm?: number | null, 
+/**
+ * Length of the sweep, mm.
+ */
+sweep_mm?: number | null, 
+/**
+ * Distance between shots, mm.
+ */
+step_mm?: number | null, 
+/**
+ * Speed, mm/s; null: the highest that camera, chain and station allow.
+ */
+speed_mm_s?: number | null, 
+/**
+ * Frame rate of another camera than the connected one, Hz.
+ */
+camera_hz?: number | null, };
 
 export type SweepPlan = { 
 /**
@@ -2135,49 +2181,3 @@ limit_mm_s: number | null,
  * Pace of a scan that does not stop for its pictures; null: no limit is known.
  */
 pace: Pace | null, };
-
-export type RepeatsAsk = { 
-/**
- * Names of the jobs.
- */
-jobs: Array<string>, };
-
-export type Spread = { 
-/**
- * x, y, z of the frame, or turn.
- */
-name: string, 
-/**
- * mm or degrees.
- */
-unit: string, 
-/**
- * Standard deviation of the poses.
- */
-scatter: number, 
-/**
- * Root mean square of the standard deviations that the poses state.
- */
-stated: number, 
-/**
- * Range from the lowest to the highest value.
- */
-apart: number, 
-/**
- * Half width of the histogram, centred on the median.
- */
-half: number, 
-/**
- * Number of poses in each bar of the histogram.
- */
-bars: Array<number>, };
-
-export type Repeats = { 
-/**
- * Number of poses.
- */
-places: number, 
-/**
- * For x, y, z and rotation; empty for fewer than two poses.
- */
-along: Array<Spread>, };

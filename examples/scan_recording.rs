@@ -4,10 +4,9 @@
 //!
 //! `sheetlight simulate --out sim` makes both: sim/scan and sim/station.
 
+use sheetlight::Scan;
 use sheetlight::fault::{Fault, Result};
 use sheetlight::recording::Recording;
-use sheetlight::rig::Rig;
-use sheetlight::station::{ScanOptions, Settings, scan_recording};
 use std::path::PathBuf;
 
 fn main() -> Result<()> {
@@ -15,11 +14,8 @@ fn main() -> Result<()> {
     let [recording, station, out] = folders.as_slice() else {
         return Err(Fault::usage("three folders are needed").next("give RECORDING STATION OUT"));
     };
-    let (settings, rig) = (Settings::load(station)?, Rig::load(station)?);
-    let options = ScanOptions::for_station(&settings, &rig, out);
-    let report = scan_recording(&Recording::open(recording)?, None, &rig, &options, |done, all| {
-        eprint!("\r{done} of {} shots", all.unwrap_or(done));
-    })?;
+    let scan = Scan::at(station)?.progress(|done, all| eprint!("\r{done} of {} shots", all.unwrap_or(done)));
+    let report = scan.recording_into(&Recording::open(recording)?, out)?;
     eprintln!();
     println!("{} points from {} shots, {}", report.points, report.shots, report.ran_on);
     println!("each good to {:.3} mm", report.median_sigma_mm.unwrap_or(f64::NAN));

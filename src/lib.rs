@@ -8,13 +8,10 @@
 //! A recording becomes a cloud, a height map and a page to look at:
 //!
 //! ```no_run
-//! use sheetlight::{recording::Recording, rig::Rig, station};
+//! use sheetlight::{Scan, recording::Recording};
 //! # fn main() -> sheetlight::fault::Result<()> {
-//! let folder = std::path::Path::new("cell3");
-//! let (settings, rig) = (station::Settings::load(folder)?, Rig::load(folder)?);
-//! let options = station::ScanOptions::for_station(&settings, &rig, "scans/board7".as_ref());
 //! let recording = Recording::open("recordings/board7".as_ref())?;
-//! let report = station::scan_recording(&recording, None, &rig, &options, |_, _| {})?;
+//! let report = Scan::at("cell3")?.recording_into(&recording, "scans/board7")?;
 //! println!("{} points, each good to {:?} mm", report.points, report.median_sigma_mm);
 //! # Ok(()) }
 //! ```
@@ -62,3 +59,5 @@ pub mod scan;
 
 pub mod find;
 pub mod station;
+
+pub use station::Scan;

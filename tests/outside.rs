@@ -6,13 +6,17 @@
 #[path = "data/outside/src/main.rs"]
 mod outside;
 
-use outside::{Held, line, measure};
+use outside::{Posed, line, measure, own};
+use sheetlight::Scan;
+use sheetlight::fault::Fault;
+use sheetlight::raster::{Image, Pixels};
 use sheetlight::recording::Recording;
-use sheetlight::rig::Rig;
-use sheetlight::scan::{HeightMap, RecordingSource, read_cloud};
+use sheetlight::rig::{Rig, Volume};
+use sheetlight::scan::{HeightMap, Profile, RecordingSource, Where, read_cloud};
 use sheetlight::simulate::{Set, SimulateOptions, simulate};
 use sheetlight::station::{ScanOptions, Settings, find_part, find_part_held, scan_held, scan_recording, shots_of};
 use std::process::Command;
+use std::sync::{Arc, Mutex};
 
 #[test]
 fn a_program_of_others_gets_the_points_that_scan_gets() {
@@ -26,7 +30,7 @@ fn a_program_of_others_gets_the_points_that_scan_gets() {
         cloud.extend(p.points.iter().copied());
         lines.extend(line(p));
     };
-    measure(&station, Held::read(&recording).unwrap(), take).unwrap();
+    measure(&station, own(&recording).unwrap(), take).unwrap();
     assert!(lines.len() > 24 && cloud.len() > 3000, "{} lines, {} points", lines.len(), cloud.len());
 
     let (mut settings, rig) = (Settings::load(&station).unwrap(), Rig::load(&station).unwrap());
@@ -99,8 +103,67 @@ fn another_picture_size_is_refused_before_a_shot_is_taken() {
     let dir = tempfile::tempdir().unwrap();
     let options = SimulateOptions { shots: 3, sets: vec![Set::Scan], ..SimulateOptions::default() };
     let station = simulate(dir.path(), &options, &|_, _| {}).unwrap().station;
-    let mut source = Held::read(&dir.path().join("scan")).unwrap();
-    source.format.width += 2;
-    let said = measure(&station, source, |_| panic!("a profile came")).unwrap_err();
+    let wider = |(image, pose): Posed| {
+        let mut levels = vec![0; 642 * 480];
+        let Pixels::U8(narrow) = &image.pixels else { panic!("8 bits") };
+        levels.chunks_mut(642).zip(narrow.chunks(640)).for_each(|(row, from)| row[..640].copy_from_slice(from));
+        (Image::from_u8(642, 480, levels), pose)
+    };
+    let pictures = || own(&dir.path().join("scan")).unwrap();
+    let never = |_: &Profile| panic!("a profile came");
+    let said = measure(&station, pictures().map(|p| p.map(wider)), never).unwrap_err();
     assert!(said.what.contains("642") && !said.next.is_empty(), "{said}");
+    // So are a picture that changes its size later, no picture, and an error of the program itself, in its own words.
+    let later = pictures().enumerate().map(|(i, p)| if i < 2 { p } else { p.map(wider) });
+    let said = measure(&station, later, never).unwrap_err();
+    assert!(said.what.contains("picture 2 is 642x480"), "{said}");
+    let said = measure(&station, [], never).unwrap_err();
+    assert!(said.what.contains("no picture"), "{said}");
+    let lost = || Err(Fault::device("the camera's cable was pulled").next("plug it in"));
+    let said = Scan::at(&station).unwrap().pictures(pictures().chain([lost()])).err().unwrap();
+    assert!(said.what.contains("cable") && said.next.contains("plug"), "{said}");
+    let all: Vec<_> =
+        Scan::at(&station).unwrap().profiles(pictures().take(1).chain([lost(), lost()])).unwrap().collect();
+    assert!(all.len() == 1 && all[0].is_err(), "an error ends it: {}", all.len());
+}
+
+/// The same points from a recording, from its pictures and poses, and picture by picture.
+#[test]
+fn a_scan_says_what_is_different_and_takes_pictures() {
+    let dir = tempfile::tempdir().unwrap();
+    let options = SimulateOptions { shots: 40, sets: vec![Set::Scan], ..SimulateOptions::default() };
+    let station = simulate(dir.path(), &options, &|_, _| {}).unwrap().station;
+    let recording = Recording::open(&dir.path().join("scan")).unwrap();
+    let told = Arc::new(Mutex::new(Vec::new()));
+    let telling = told.clone();
+    let scan = Scan::at(&station)
+        .unwrap()
+        .on(Where::Cpu)
+        .cell_mm(0.5)
+        .progress(move |done, all| telling.lock().unwrap().push((done, all)));
+    let whole = scan.recording(&recording).unwrap();
+    assert_eq!(told.lock().unwrap().last(), Some(&(40, Some(40))));
+    assert_eq!(whole.map.as_ref().unwrap().cell, 0.5);
+    let given = scan.pictures(own(&recording.folder).unwrap()).unwrap();
+    assert!(given.points == whole.points && given.points.len() > 3000, "{} points", given.points.len());
+    let out = dir.path().join("result");
+    scan.recording_into(&recording, &out).unwrap();
+    assert!(read_cloud(&out.join("cloud.ply")).unwrap() == whole.points);
+    // The rig alone has the defaults of a station that states nothing.
+    let of_rig = Scan::of(Rig::load(&station).unwrap()).on(Where::Cpu).volume(Volume::new(1.0, 2.0, "stated"));
+    assert!(of_rig.pictures(own(&recording.folder).unwrap()).unwrap().points.is_empty(), "nothing is 1 to 2 mm away");
+    // A picture alone has its points in the camera's frame.
+    let (picture, pose) = own(&recording.folder).unwrap().nth(20).unwrap().unwrap();
+    let alone = scan.picture(picture).unwrap();
+    let rig = Rig::load(&station).unwrap();
+    let from_camera = pose * rig.hand_eye.unwrap().value;
+    let of_shot: Vec<_> = whole.points.iter().filter(|p| p.shot == 20).collect();
+    let kept = alone.peaks.iter().zip(&alone.points).filter(|(peak, _)| peak.kept());
+    let near = |at: [f32; 3]| {
+        let at = from_camera.point(&at.map(f64::from).into());
+        of_shot.iter().any(|q| (q.at() - at).norm() < 0.2)
+    };
+    let found: Vec<bool> = kept.map(|(_, p)| near(p.position.to_array())).collect();
+    let share = found.iter().filter(|near| **near).count() as f64 / found.len() as f64;
+    assert!(found.len() > 100 && share > 0.97, "{share} of {} points", found.len());
 }

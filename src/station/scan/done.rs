@@ -90,7 +90,7 @@ impl Done<'_> {
 }
 
 /// The scanner for such pictures, and the collector of their levels.
-pub(super) fn scanner_for(
+pub(in crate::station) fn scanner_for(
     rig: &Rig,
     source: &dyn Source,
     options: &ScanOptions,

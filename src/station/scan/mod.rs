@@ -1,7 +1,7 @@
 //! In: a source of shots, a station. Out: the scan's folder: cloud, height map, pictures, report.
 //! Frame and unit: cloud in the base frame, mm (docs/file-formats.md).
 
-mod done;
+pub(super) mod done;
 pub(super) mod held;
 pub(super) mod options;
 mod overlays;

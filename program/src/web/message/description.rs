@@ -2,41 +2,38 @@
 //! schemas, from which clients are generated.
 //! Frame and unit: none.
 
-use super::MESSAGES;
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, SchemaGenerator};
 use serde_json::{Map, Value, json};
 use ts_rs::TS;
 
-/// Makes a message's TypeScript declaration.
-pub type Declared = fn() -> String;
-/// Adds a message's schema to those of a generator.
-pub type Described = fn(&mut SchemaGenerator);
-
-/// The declaration of one message.
-pub fn declared<T: TS>() -> String {
-    T::decl()
+/// How a message is described.
+pub struct Message {
+    declared: fn() -> String,
+    described: fn(&mut SchemaGenerator) -> schemars::Schema,
 }
 
-/// Adds the schema of one message.
-pub fn described<T: JsonSchema>(to: &mut SchemaGenerator) {
-    to.subschema_for::<T>();
+/// The description of one message.
+pub const fn message<T: TS + JsonSchema>() -> Message {
+    Message { declared: T::decl, described: SchemaGenerator::subschema_for::<T> }
 }
 
-/// Content of `docs/messages.d.ts`; a test compares the file with this.
-pub fn declarations() -> String {
-    let declared: Vec<String> = MESSAGES.iter().map(|(declared, _)| format!("export {}", declared())).collect();
+/// The messages' TypeScript declarations.
+pub fn declarations(messages: &[Message]) -> String {
+    let declared: Vec<String> = messages.iter().map(|message| format!("export {}", (message.declared)())).collect();
     format!(
         "// Made from program/src/web/message by the test `messages`; SHEETLIGHT_WRITE=1 makes it again.\n\n{}\n",
         declared.join("\n\n")
     )
 }
 
-/// JSON schema of every message by its name, as `components.schemas` of an OpenAPI description holds them.
-pub fn schemas() -> Map<String, Value> {
+/// The messages' JSON schemas by their names.
+pub fn schemas(messages: &[Message]) -> Map<String, Value> {
     let settings = SchemaSettings::draft2020_12().with(|s| s.definitions_path = "/components/schemas".into());
     let mut generator = settings.into_generator();
-    MESSAGES.iter().for_each(|(_, described)| described(&mut generator));
+    for message in messages {
+        (message.described)(&mut generator);
+    }
     let mut schemas = generator.take_definitions(true);
     for name in schemas.keys().cloned().collect::<Vec<_>>() {
         name_kinds(&mut schemas, &name);

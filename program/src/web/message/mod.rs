@@ -17,18 +17,14 @@ mod settings;
 mod surface;
 mod sweep;
 
-use description::{Declared, Described, declared, described};
-pub use description::{declarations, schemas};
+use description::{Message, message};
 
 /// Lists the messages: what is not listed here is neither imported, declared nor described.
 macro_rules! messages {
     ($($($place:ident)::+ { $($message:ident,)+ })+) => {
         $(pub use $($place)::+::{$($message),+};)+
 
-        /// Each message's declaration and schema.
-        const MESSAGES: &[(Declared, Described)] = &[
-            $($((declared::<$message>, described::<$message>),)+)+
-        ];
+        const MESSAGES: &[Message] = &[$($(message::<$message>(),)+)+];
     };
 }
 
@@ -59,4 +55,14 @@ messages! {
         SectionPoint,
     }
     sweep { Pace, SweepAsk, SweepPlan, }
+}
+
+/// Content of `docs/messages.d.ts`; a test compares the file with this.
+pub fn declarations() -> String {
+    description::declarations(MESSAGES)
+}
+
+/// JSON schema of every message by its name, as `components.schemas` of an OpenAPI description holds them.
+pub fn schemas() -> serde_json::Map<String, serde_json::Value> {
+    description::schemas(MESSAGES)
 }

@@ -5,61 +5,33 @@
 //!
 //!   outside RECORDING STATION
 
+use sheetlight::Scan;
 use sheetlight::fault::{Fault, Result};
-use sheetlight::recording::{Motion, Recording, Stand};
-use sheetlight::rig::Rig;
-use sheetlight::scan::{BadShot, Carrier, CloudPoint, Format, Profile, Scanner, Shot, Source, Where};
-use sheetlight::station::{ScanOptions, Settings};
-use std::collections::VecDeque;
+use sheetlight::geometry::{Base, Flange, Rigid};
+use sheetlight::raster::Image;
+use sheetlight::recording::Recording;
+use sheetlight::scan::{CloudPoint, Profile, Where};
 use std::path::{Path, PathBuf};
 
-/// Shots that this program holds in memory.
-pub struct Held {
-    pub format: Format,
-    pub shots: VecDeque<Shot>,
-}
+/// A picture, and where the robot's flange was.
+pub type Posed = (Image, Rigid<Base, Flange>);
 
-impl Held {
-    pub fn read(folder: &Path) -> Result<Held> {
-        let recording = Recording::open(folder)?;
-        let poses = recording.poses(None)?;
-        let (image, bits) = (&recording.meta.image, recording.bits());
-        let format = Format { width: image.width, height: image.height, bits };
-        let named = recording.meta.frames.iter().filter_map(|f| Some((f.laser.clone()?, f.pose?)));
-        let shots = named.enumerate().map(|(index, (name, pose))| {
-            let image = recording.picture(&name)?;
-            let stand = Stand::Robot(*recording.pose_of(pose, &poses)?);
-            Ok(Shot { index: index as u32, name, image, stand, slip: None, here_ns: None })
-        });
-        Ok(Held { format, shots: shots.collect::<Result<_>>()? })
-    }
-}
-
-impl Source for Held {
-    fn format(&self) -> Format {
-        self.format
-    }
-    fn remaining(&self) -> Option<usize> {
-        Some(self.shots.len())
-    }
-    fn next(&mut self) -> Option<std::result::Result<Shot, BadShot>> {
-        self.shots.pop_front().map(Ok)
-    }
+/// The pictures of a folder, each read when it is asked for.
+pub fn own(folder: &Path) -> Result<impl Iterator<Item = Result<Posed>> + use<>> {
+    let recording = Recording::open(folder)?;
+    let poses = recording.poses(None)?;
+    let frames = recording.meta.frames.clone().into_iter().filter_map(|f| Some((f.laser?, f.pose?)));
+    Ok(frames.map(move |(name, pose)| Ok((recording.picture(&name)?, *recording.pose_of(pose, &poses)?))))
 }
 
 /// Calls `take` with each profile, in order.
-pub fn measure(station: &Path, mut source: impl Source, mut take: impl FnMut(&Profile)) -> Result<()> {
-    let (settings, rig) = (Settings::load(station)?, Rig::load(station)?);
-    let o = ScanOptions::for_station(&settings, &rig, Path::new(""));
-    let carrier = Carrier::new(&rig, &Motion::default())?;
-    let (format, volume, place) = (source.format(), o.volume.as_ref(), Where::Cpu.open()?);
-    let mut scanner = Scanner::new(&rig, carrier, format, &o.extraction, volume, None, place)?;
-    while let Some(shot) = source.next() {
-        scanner.push(shot.map_err(|bad| bad.fault)?)?;
-        scanner.ready()?.iter().for_each(&mut take);
-    }
-    scanner.finish()?.iter().for_each(take);
-    Ok(())
+pub fn measure(
+    station: &Path,
+    pictures: impl IntoIterator<Item = Result<Posed>>,
+    mut take: impl FnMut(&Profile),
+) -> Result<()> {
+    let profiles = Scan::at(station)?.on(Where::Cpu).profiles(pictures)?;
+    profiles.into_iter().try_for_each(|profile| profile.map(|profile| take(&profile)))
 }
 
 /// The highest point of a profile.
@@ -77,5 +49,5 @@ fn main() -> Result<()> {
         return Err(Fault::usage("two folders are needed").next("give RECORDING STATION"));
     };
     println!("shot,z_mm,sigma_mm");
-    measure(station, Held::read(recording)?, |p| line(p).iter().for_each(|l| println!("{l}")))
+    measure(station, own(recording)?, |p| line(p).iter().for_each(|l| println!("{l}")))
 }
