@@ -1,5 +1,5 @@
-//! In: this source, a small calibration (tests/data/added_calibration). Out: whether a file and edits of five others are
-//! all that a new calibration takes: a copy of the source with them is built, the command calibrates, and the HTTP
+//! In: this source, a small calibration (tests/data/added_calibration). Out: whether a file and edits of five others
+//! are all that a new calibration takes: a copy of the source with them is built, the command calibrates, and the HTTP
 //! interface describes the order. SHEETLIGHT_LONG=1; the short form looks whether the places are there.
 //! Frame and unit: none.
 
