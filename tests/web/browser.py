@@ -33,9 +33,13 @@ class Browser:
         return shutil.which("chromedriver") and (shutil.which("chromium") or shutil.which("google-chrome"))
 
     def __init__(self, folder, width=1280, height=800, flags=()):
-        self.driver = subprocess.Popen(["chromedriver", "--port=0"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-        # chromedriver chooses a free port and prints its number.
-        port = next((m[1] for m in map(re.compile(r"success.* port (\d+)").search, self.driver.stdout) if m), None)
+        # chromedriver chooses a free port and prints its number. It ends if another program takes the port meanwhile.
+        for _ in range(3):
+            self.driver = subprocess.Popen(["chromedriver", "--port=0"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+            port = next((m[1] for m in map(re.compile(r"success.* port (\d+)").search, self.driver.stdout) if m), None)
+            if port:
+                break
+            self.driver.wait()
         assert port, "chromedriver does not say its port"
         self.root = f"http://127.0.0.1:{port}"
         threading.Thread(target=self.driver.stdout.read, daemon=True).start()

@@ -112,13 +112,12 @@ def names(s, job):
         ended = s.job({"procedure": "scan", "recording": recording})
         assert ended["state"] == "failed", ended
     # A pose file that would do lies beside the recording.
-    others = [shutil.copy(os.path.join(folder, "scan", f"poses.{kind}"), os.path.join(folder, f"others.{kind}")) for kind in ("csv", "json")]
-    picture = os.path.join(folder, "scan", "laser_000.png")
+    others = shutil.copy(os.path.join(folder, "scan", "poses.json"), os.path.join(folder, "others.json"))
+    picture = os.path.join(folder, "scan", "ambient.png")
     for extra in ({"poses": "../others"}, {"poses": "/etc/passwd"}, {"ambient": ["../station/x.png"]}, {"ambient": ["/etc/passwd"]}, {"ambient": [picture]}):
         ended = s.job({"procedure": "scan", "recording": "scan", **extra})
         assert ended["state"] == "failed" and ended["problem"]["kind"] in ("input", "usage"), (extra, ended)
-    for other in others:
-        os.unlink(other)
+    os.unlink(others)
     os.unlink(os.path.join(jobs, job, "link.json"))
     os.unlink(os.path.join(jobs, job, "up"))
 
@@ -144,7 +143,7 @@ def bodies(s):
             pass
         assert sent < 64 << 20, f"{sent} bytes were taken"
         assert not answer or answer.split()[1].startswith(b"4"), answer[:80]
-    for body in (b"", b"[]", b"null", b"{\"procedure\":\"scan\"}", b"{\"procedure\":\"dance\"}", b"[" * 5000, b"{\"procedure\":\"check\",\"x\":1}", b"\xff\xfe"):
+    for body in (b"", b"[]", b"null", b"{\"procedure\":\"scan\"}", b"{\"procedure\":\"dance\"}", b"[" * 5000, b"{\"procedure\":\"check\",\"x\":1}", b"{\"procedure\":\"calibrate\",\"target\":\"camera\",\"recording\":\"scan\",\"lense\":\"four\"}", b"\xff\xfe"):
         refused(f"order {body[:30]}", s.ask("POST", "/api/v1/jobs", body)[0])
     for method in ("DELETE", "PUT", "PATCH", "TRACE", "OPTIONS"):
         refused(f"{method} of the bar", s.ask(method, "/api/v1/bar", b"")[0])

@@ -184,3 +184,32 @@ orders! {
     /// A linear axis or turntable that moves parts in front of a fixed camera.
     Axis(AxisOrder),
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sheetlight::calibrate::camera::lens::Lens;
+
+    #[test]
+    fn an_order_is_read_as_it_is_written_and_nothing_in_it_is_dropped() {
+        let read = |rest: &str| {
+            let text = format!(r#"{{"target":"camera","recording":"a"{rest}}}"#);
+            serde_json::from_str::<CalibrateOrder>(&text).map_err(|error| error.to_string())
+        };
+        let camera = |inputs: CameraOrder| Ok(CalibrateOrder::Camera(CameraOrder { recording: "a".into(), ..inputs }));
+        assert_eq!(read(""), camera(CameraOrder::default()));
+        assert_eq!(read(r#","lens":null"#), camera(CameraOrder::default()));
+        assert_eq!(read(r#","lens":"four""#), camera(CameraOrder { lens: Lens::Four, ..CameraOrder::default() }));
+        assert_eq!(read(r#","leave_out":[3]"#), camera(CameraOrder { leave_out: vec![3], ..CameraOrder::default() }));
+        assert!(read(r#","lense":"four""#).unwrap_err().contains("lense"));
+        let said = read(r#","lens":"fore""#).unwrap_err();
+        assert!(said.contains("fore") && said.contains("scheimpflug"), "{said}");
+        // An input of another calibration is none of this one.
+        assert!(read(r#","mount":"eye-in-hand""#).is_err());
+        for target in Target::VARIANTS {
+            let order = CalibrateOrder::new(*target, "b".into());
+            let again = serde_json::from_str(&serde_json::to_string(&order).unwrap()).unwrap();
+            assert_eq!((&order, order.target(), order.recording()), (&again, *target, "b"));
+        }
+    }
+}
