@@ -326,7 +326,7 @@ cell_mm?: number | null,
  */
 skip_bad: boolean, 
 /**
- * Settings that differ from the station's: dotted keys of [extraction] in station.toml, and their values
+ * Settings that differ from the station's: dotted keys of the section extraction in station.toml, and their values
  */
 settings: Record<string, unknown>, };
 

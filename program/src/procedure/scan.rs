@@ -54,7 +54,7 @@ pub struct ScanOrder {
     #[arg(long)]
     #[serde(default)]
     pub skip_bad: bool,
-    /// Settings that differ from the station's: dotted keys of [extraction] in station.toml, and their values
+    /// Settings that differ from the station's: dotted keys of the section extraction in station.toml, and their values
     #[arg(skip)]
     #[serde(default)]
     #[ts(type = "Record<string, unknown>")]
