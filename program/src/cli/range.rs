@@ -20,11 +20,11 @@ use std::path::PathBuf;
   sheetlight range recordings/pointer --station cell3 --json > distances.json
 Guide: docs/finding-and-inserting.md")]
 pub struct Args {
-    #[command(flatten)]
-    inputs: TouchOrder,
     /// Station folder with camera and pointer calibrations
     #[arg(long)]
     station: PathBuf,
+    #[command(flatten)]
+    inputs: TouchOrder,
     /// All shots show one plane: compute its normal (needs poses and hand-eye)
     #[arg(long)]
     surface: bool,

@@ -38,14 +38,14 @@ use std::path::{Path, PathBuf};
 All options: sheetlight help scan
 Guide: docs/scanning.md")]
 pub struct Args {
-    #[command(flatten)]
-    order: ScanOrder,
     /// Station folder with the calibration
     #[arg(long)]
     station: PathBuf,
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
+    #[command(flatten)]
+    order: ScanOrder,
     /// Raw frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le; --poses is then a path
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<RawFormat>, conflicts_with = "recording")]
     raw: Option<RawFormat>,

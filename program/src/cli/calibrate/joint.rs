@@ -24,11 +24,11 @@ use std::path::{Path, PathBuf};
   sheetlight calibrate joint recordings/* --station cell3
 Guide: docs/joint.md")]
 pub struct Args {
-    #[command(flatten)]
-    inputs: JointOrder,
     /// Station folder for the results
     #[arg(long)]
     station: PathBuf,
+    #[command(flatten)]
+    inputs: JointOrder,
     #[command(flatten)]
     keep: Keep,
 }

@@ -11,11 +11,11 @@ use std::path::PathBuf;
 /// The inputs, with the station's folder and what happens with a bad result.
 #[derive(clap::Args)]
 pub struct One<Inputs: clap::Args> {
-    #[command(flatten)]
-    inputs: Inputs,
     /// Station folder; the result is stored in it
     #[arg(long)]
     station: PathBuf,
+    #[command(flatten)]
+    inputs: Inputs,
     #[command(flatten)]
     keep: Keep,
 }
