@@ -9,7 +9,7 @@ use crate::recording::Stand;
 use crate::scan::{BadShot, Shot, Source};
 use std::iter::Peekable;
 
-/// A picture with the pose of the flange when it was taken, or why there is none.
+/// A picture with the pose of the flange at its exposure, or the error that ends the scan.
 pub type Given = Result<(Image, Rigid<Base, Flange>)>;
 
 /// Shots from an iterator.

@@ -83,7 +83,7 @@ impl Scan {
         self.options.skip_bad = true;
         self
     }
-    /// Is told how many shots are done, and how many there are in all, if that is known.
+    /// Calls `told` after each shot with the number of shots done and the number of all shots, if it is known.
     pub fn progress(mut self, told: impl Fn(usize, Option<usize>) + Send + Sync + 'static) -> Scan {
         self.told = Some(Arc::new(told));
         self

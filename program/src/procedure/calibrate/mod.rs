@@ -204,7 +204,7 @@ mod tests {
         assert!(read(r#","lense":"four""#).unwrap_err().contains("lense"));
         let said = read(r#","lens":"fore""#).unwrap_err();
         assert!(said.contains("fore") && said.contains("scheimpflug"), "{said}");
-        // An input of another calibration is none of this one.
+        // The mount belongs to the hand-eye calibration: the camera's refuses it.
         assert!(read(r#","mount":"eye-in-hand""#).is_err());
         for target in Target::VARIANTS {
             let order = CalibrateOrder::new(*target, "b".into());
