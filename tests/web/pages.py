@@ -276,6 +276,12 @@ def copied(s, b):
     b.ask("POST", "/window", {"handle": there})
     b.ready("station")
     assert len(mine()) == 16 and mine() != name, "two tabs operate under one name"
+    # Chromium 156 sometimes forgets that a request for a lock was given up: one of about 100 copied tabs stayed empty.
+    forgets = "const ask = navigator.locks.request.bind(navigator.locks); navigator.locks.request = (name, _, grant) => ask(name, grant);"
+    b.ask("POST", "/goog/cdp/execute", {"cmd": "Page.addScriptToEvaluateOnNewDocument", "params": {"source": forgets}})
+    b.run("sessionStorage.tab = arguments[0]", name)
+    b.reload("station")
+    assert len(mine()) == 16 and mine() != name, "two tabs operate under one name where a lock's request is not given up"
     b.ask("DELETE", "/window")
     b.ask("POST", "/window", {"handle": here})
     assert mine() == name

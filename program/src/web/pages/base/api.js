@@ -13,19 +13,27 @@ const STUCK = 10000;
 const takes = (name) =>
   new Promise((done) => {
     const others = new BroadcastChannel(`tab-${name}`),
-      lives = new AbortController();
-    const taken = () => {
+      wait = new AbortController();
+    let taken = false;
+    // Resolved here, not by the request's rejection: Chromium 156 forgets an abort that arrives
+    // while it still prepares the request.
+    const refuse = () => {
+      if (taken) return;
+      wait.abort();
+      others.close();
+      done(false);
+    };
+    const grant = () => {
+      if (wait.signal.aborted) return null;
+      taken = true;
       others.onmessage = (m) => m.data === "whose" && others.postMessage("mine");
       done(true);
       return new Promise(() => {});
     };
-    navigator.locks.request(`tab-${name}`, { signal: lives.signal }, taken).catch(() => {
-      others.close();
-      done(false);
-    });
-    others.onmessage = (m) => m.data === "mine" && lives.abort();
+    navigator.locks.request(`tab-${name}`, { signal: wait.signal }, grant).catch(refuse);
+    others.onmessage = (m) => m.data === "mine" && refuse();
     others.postMessage("whose");
-    setTimeout(() => lives.abort(), STUCK);
+    setTimeout(refuse, STUCK);
   });
 /**
  * This tab's name, by which the server knows it; it survives a reload. A copied tab gets a new name,
