@@ -82,7 +82,7 @@ impl ScanOrder {
     /// # Errors
     /// It cannot be read, or does not have what the order selects.
     pub fn open(&self, at: &At) -> Result<Recording> {
-        let mut recording = Recording::open(&(at.path)(&self.recording)?)?;
+        let mut recording = at.recording(&self.recording)?;
         recording.channel = self.channel;
         at.check(&recording, self.poses.as_deref())?;
         if recording.meta.motion().axis().is_none() {
@@ -103,7 +103,7 @@ impl ScanOrder {
     pub fn dark(&self, at: &At, recording: &Recording) -> Result<Option<Image>> {
         let load = |name: &String| {
             let inside = recording.inside(name).ok().filter(|path| path.is_file());
-            let path = inside.map_or_else(|| (at.path)(name), Ok)?;
+            let path = inside.map_or_else(|| at.names.path(name), Ok)?;
             recording.load(&path).map_err(no_ambient)
         };
         recording.dark(self.ambient.iter().map(load).collect::<Result<_>>()?)

@@ -5,7 +5,6 @@ use super::at::At;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sheetlight::fault::Result;
-use sheetlight::recording::Recording;
 use sheetlight::rig::Rig;
 use sheetlight::station::{RangeReport, RangeRun, Settings, measure_range};
 use ts_rs::TS;
@@ -28,7 +27,7 @@ impl TouchOrder {
     /// # Errors
     /// An input that cannot be read, or no spot.
     pub fn measure(&self, at: &At, settings: &Settings, one_surface: bool) -> Result<RangeReport> {
-        let recording = Recording::open(&(at.path)(&self.recording)?)?;
+        let recording = at.recording(&self.recording)?;
         at.check(&recording, self.poses.as_deref())?;
         let tool = settings.tool.map(|t| t.flange_from_tool);
         let run = RangeRun { poses: self.poses.clone(), one_surface, tool, ..RangeRun::default() };

@@ -1,4 +1,5 @@
-//! In: an input that is one of several words. Out: its form on the command line, in orders, and in their JSON schema.
+//! In: an input that is one of several words, or several numbers. Out: its form on the command line; a word's in orders
+//! and in their JSON schema, too.
 //! Frame and unit: none.
 
 use schemars::{Schema, SchemaGenerator, json_schema};
@@ -10,6 +11,13 @@ use strum::VariantArray;
 /// Parses the word, for clap's `value_parser`.
 pub(crate) fn parse<T: FromStr<Err = String>>(word: &str) -> Result<T, String> {
     word.parse()
+}
+
+/// Parses numbers separated by commas, for clap's `value_parser`.
+pub(crate) fn numbers<const N: usize>(s: &str) -> Result<[f64; N], String> {
+    let read: Option<Vec<f64>> = s.split(',').map(|v| v.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    let read = read.and_then(|v| v.try_into().ok());
+    read.ok_or_else(|| format!("wanted {N} numbers parted by commas, e.g. {}", vec!["0"; N].join(",")))
 }
 
 /// Writes the word.

@@ -6,13 +6,11 @@ use super::joint::finish;
 use super::store::{Keep, stale};
 use crate::cli::insert::moving::Moving;
 use crate::cli::terminal::console::Console;
-use sheetlight::calibrate::hand_eye::options::Mount;
+use crate::cli::terminal::surroundings::in_folder;
+use crate::procedure::calibrate::AutoOrder;
 use sheetlight::fault::Result;
-use sheetlight::recording::BoardSpec;
 use sheetlight::rig::Rig;
-use sheetlight::scan::Where;
-use sheetlight::station::volume::asked;
-use sheetlight::station::{ArmCell, AutoRun, JointRun, Settings, calibrate_auto, mount_of};
+use sheetlight::station::{ArmCell, Settings, calibrate_auto};
 use std::path::PathBuf;
 
 /// Calibrate everything while the program moves the robot
@@ -32,25 +30,11 @@ Guide: docs/calibration.md")]
 pub struct Args {
     #[command(flatten)]
     moving: Moving,
-    /// The board's description (docs/boards.md)
-    #[arg(long)]
-    board: PathBuf,
+    #[command(flatten)]
+    order: AutoOrder,
     /// Folder for the pictures; new or empty
     #[arg(long)]
     out: PathBuf,
-    /// Target for the expected error of a scanned point, mm rms
-    #[arg(long, value_name = "MM")]
-    target_mm: f64,
-    /// Where the camera is: eye-in-hand (on the flange) or eye-to-hand (fixed) [default: the station's, else
-    /// eye-in-hand with a note]
-    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Mount>)]
-    mount: Option<Mount>,
-    /// Largest number of stops
-    #[arg(long, default_value_t = 40)]
-    most: usize,
-    /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
-    #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
-    on: Where,
     #[command(flatten)]
     keep: Keep,
 }
@@ -58,19 +42,7 @@ pub struct Args {
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let moving = &args.moving;
     let (settings, rig) = (Settings::load(&moving.station)?, Rig::load_camera(&moving.station)?);
-    let mounted = mount_of(&moving.station, &settings, args.mount)?;
-    mounted.assumed.iter().for_each(|why| console.say(why));
-    let run = AutoRun {
-        joint: JointRun::new(mounted.mount, asked(&settings, None), &settings.extraction, args.on),
-        board: BoardSpec::load(&args.board)?,
-        out: args.out.clone(),
-        target_mm: args.target_mm,
-        most: args.most,
-        working: settings.volume().map(|v| [v.near_mm, v.far_mm]),
-        candidates: 150,
-        seed: 1,
-    };
-    run.check()?;
+    let run = in_folder(&moving.station, console, |at| args.order.run(at, &settings, args.out.clone()))?;
     let camera = moving.camera.open(None)?;
     let mut guard = moving.guard()?;
     let mut person = moving.person(console);

@@ -2,10 +2,9 @@
 //! Frame and unit: the height map's grid frame, mm from its corner.
 
 use crate::cli::terminal::console::Console;
+use crate::cli::terminal::surroundings::Typed;
+use crate::procedure::FilterOrder;
 use sheetlight::fault::Result;
-use sheetlight::files::not_over_any;
-use sheetlight::scan::Filter;
-use sheetlight::station::{filter_scan, of_a_scan};
 use std::path::PathBuf;
 
 /// Remove glints, dust and unwanted regions from a scan
@@ -22,20 +21,15 @@ use std::path::PathBuf;
   sheetlight filter scans/board7 --filter islands:20,0.5 --filter sigma:0.1 --out scans/clean7
 Guide: docs/scanning.md")]
 pub struct Args {
-    /// Folder from sheetlight scan --out
-    scan: PathBuf,
-    /// Filter: sigma:MM, heights:LOW,HIGH, cut:X0,Y0,X1,Y1, keep:X0,Y0,X1,Y1 or islands:CELLS,STEP; may be repeated
-    #[arg(long = "filter", required = true, value_parser = crate::cli::terminal::arguments::parse::<Filter>,
-        allow_hyphen_values = true)]
-    filters: Vec<Filter>,
+    #[command(flatten)]
+    order: FilterOrder,
     /// Folder for the filtered scan
     #[arg(long)]
     out: PathBuf,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    not_over_any(&args.out.join("scan.json"), &args.scan, of_a_scan)?;
-    let report = filter_scan(&args.scan, &args.filters, &args.out)?;
+    let report = args.order.filter(&Typed, &args.out)?;
     let cells = report.filtered.iter().flat_map(|f| f.filters.iter().zip(&f.cells));
     let mut said: String = cells.map(|(f, n)| format!("{n} cells: {f:?}\n")).collect();
     said += &format!("{} points are left\n", report.points);

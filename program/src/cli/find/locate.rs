@@ -5,13 +5,11 @@
 use crate::cli::terminal::console::Console;
 use crate::cli::terminal::outputs;
 use crate::cli::terminal::outputs::Inputs;
+use crate::cli::terminal::surroundings::Typed;
+use crate::procedure::{FindOrder, Located};
 use sheetlight::fault::{Fault, Result};
+use sheetlight::find::Report;
 use sheetlight::find::look::looks::Disagreement;
-use sheetlight::find::{Accelerator, LocateOptions, Recipe, Report};
-use sheetlight::geometry::Vec3;
-use sheetlight::recording::Recording;
-use sheetlight::robot::Convention;
-use sheetlight::station::{Looked, Settings, find_part_in_all, with_scale};
 use std::path::{Path, PathBuf};
 
 /// Find a part in a scan and compute the insertion pose
@@ -28,50 +26,22 @@ use std::path::{Path, PathBuf};
       --recipe led.toml --station cell3 --out led.json
 Guide: docs/finding-and-inserting.md")]
 pub struct Args {
-    /// Folders from sheetlight scan --out: one, or several scans of the same part
-    #[arg(required = true)]
-    scans: Vec<PathBuf>,
-    /// Recording of the pointer's spot on plain surfaces of the part, with robot poses; checks the height
-    #[arg(long, value_name = "RECORDING")]
-    range: Option<PathBuf>,
-    /// Recipe (TOML) of the part
-    #[arg(long)]
-    recipe: PathBuf,
+    #[command(flatten)]
+    order: FindOrder,
     /// File for the report (JSON); a picture (.png) is written beside it
     #[arg(long)]
     out: PathBuf,
     /// Station of the scan; its covariances enter the error budget
     #[arg(long)]
     station: Option<PathBuf>,
-    /// Notation of the poses: denso, ur, kuka, ... (docs/conventions.md) [default: the station's, else matrix]
-    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
-    robot: Option<Convention>,
-    /// Direction towards the camera, base frame [default: from the station, else 0,0,1]
-    #[arg(long, value_name = "X,Y,Z", value_parser = crate::cli::terminal::arguments::numbers::<3>,
-        allow_hyphen_values = true)]
-    up: Option<[f64; 3]>,
-    /// List every match, not only the best
-    #[arg(long)]
-    all: bool,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let image = args.out.with_extension("png");
-    let scans: Vec<&Path> = args.scans.iter().map(PathBuf::as_path).collect();
-    let inputs = Inputs { files: &[&args.recipe], scans: &scans, station: args.station.as_deref() };
+    let scans: Vec<&Path> = args.order.scans.iter().map(Path::new).collect();
+    let inputs = Inputs { files: &[Path::new(&args.order.recipe)], scans: &scans, station: args.station.as_deref() };
     outputs::check(&[&args.out, &image], &inputs)?;
-    let recipe = Recipe::load(&args.recipe)?;
-    let of_station = args.station.as_deref().map(Settings::load).transpose()?.and_then(|s| s.robot);
-    let up = args.up.map(Vec3::from);
-    if up.is_some_and(|u| u.norm() < 1e-6) {
-        return Err(Fault::usage("--up has no direction").next("give three numbers, e.g. 0,0,1"));
-    }
-    let robot = args.robot.or(of_station).unwrap_or(Convention::Matrix);
-    let options = LocateOptions { up, robot, accelerator: Accelerator::open(), expected: None, all: args.all };
-    let range = args.range.as_deref().map(Recording::open).transpose()?;
-    let looked = Looked { scans: &args.scans, range: range.as_ref() };
-    let (report, picture) = find_part_in_all(&looked, &recipe, args.station.as_deref(), &options)
-        .map_err(|fault| with_scale(fault, &args.scans, &recipe, &options))?;
+    let Located { report, picture, .. } = args.order.find(&Typed, args.station.as_deref(), true)?;
     let text = serde_json::to_string_pretty(&report).expect("plain data");
     sheetlight::files::write_beside((&args.out, text.as_bytes()), &[(&image, &picture.to_png())])?;
     console.result(&report, &summary(&report));

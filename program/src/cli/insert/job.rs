@@ -4,11 +4,10 @@
 
 use super::moving::Moving;
 use crate::cli::terminal::console::Console;
+use crate::procedure::InsertOrder;
 use sheetlight::fault::{Fault, Result};
-use sheetlight::robot::Convention;
-use sheetlight::scan::Where;
 use sheetlight::station::Settings;
-use sheetlight::station::job::{Job, JobOptions, JobReport, Outcome, Phase, Resumes};
+use sheetlight::station::job::{Job, JobReport, Outcome, Phase, Resumes};
 use std::path::{Path, PathBuf};
 
 /// Insert a part with a linked robot: touch, scan, find, approach, insert, retract
@@ -27,25 +26,11 @@ Guide: docs/robots.md")]
 pub struct Args {
     #[command(flatten)]
     moving: Moving,
-    /// Recipe (TOML) of the part
-    #[arg(long)]
-    recipe: PathBuf,
+    #[command(flatten)]
+    order: InsertOrder,
     /// Folder of the job: state, recordings, scan, report; with --repeat one folder per job
     #[arg(long)]
     out: PathBuf,
-    /// Sweep length centred on the picture, mm [default: the part and an eighth of the field's short side at both
-    /// ends]
-    #[arg(long)]
-    sweep: Option<f64>,
-    /// Notation in which poses are shown [default: the station's, else denso]
-    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
-    notation: Option<Convention>,
-    /// Where the stages run: auto (a hardware GPU, else the processor), gpu or cpu
-    #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
-    on: Where,
-    /// Largest angle between the touched board and the found part, degrees
-    #[arg(long, value_name = "DEG", default_value_t = 3.0)]
-    max_tilt_deg: f64,
     /// Number of jobs in a row; the first that is stopped ends them
     #[arg(long, default_value_t = 1)]
     repeat: u32,
@@ -55,20 +40,11 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let moving = &args.moving;
     let settings = Settings::load(&moving.station)?;
     let mut guard = moving.guard()?;
-    let robot = args.notation.or(settings.robot).unwrap_or(Convention::Denso);
+    let order = InsertOrder { speed_mm_s: moving.speed, ..args.order.clone() };
     let mut reports = Vec::new();
     for k in 0..args.repeat.max(1) {
         let out = if args.repeat > 1 { args.out.join(format!("job_{k:04}")) } else { args.out.clone() };
-        let options = JobOptions {
-            station: moving.station.clone(),
-            recipe: args.recipe.clone(),
-            out: out.clone(),
-            robot,
-            place: args.on,
-            speed_mm_s: moving.speed,
-            sweep_mm: args.sweep,
-            max_tilt_deg: args.max_tilt_deg,
-        };
+        let options = order.options(&moving.station, &settings, PathBuf::from(&order.recipe), out.clone());
         let mut person = moving.person(console);
         let report = Job::open(&options, &mut guard, moving.camera.open(None)?, &mut person)?.run()?;
         let stopped = report.outcome == Outcome::Stopped;

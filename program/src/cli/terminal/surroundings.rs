@@ -2,9 +2,32 @@
 //! Frame and unit: none.
 
 use super::console::Console;
-use crate::procedure::{At, Remark};
+use crate::procedure::{At, Names, Remark};
 use sheetlight::fault::Result;
+use sheetlight::find::Recipe;
+use sheetlight::recording::BoardSpec;
 use std::path::{Path, PathBuf};
+
+/// Names as typed: paths.
+pub struct Typed;
+
+impl Names for Typed {
+    fn path(&self, name: &str) -> Result<PathBuf> {
+        Ok(PathBuf::from(name))
+    }
+    fn scan(&self, name: &str) -> Result<PathBuf> {
+        Ok(PathBuf::from(name))
+    }
+    fn recipe(&self, name: &str) -> Result<Recipe> {
+        Recipe::load(Path::new(name))
+    }
+    fn board(&self, name: &str) -> Result<BoardSpec> {
+        BoardSpec::load(Path::new(name))
+    }
+    fn confined(&self) -> bool {
+        false
+    }
+}
 
 /// Executes a part of a procedure on a station's folder.
 pub fn in_folder<T>(station: &Path, console: &Console, part: impl FnOnce(&At) -> Result<T>) -> Result<T> {
@@ -12,7 +35,7 @@ pub fn in_folder<T>(station: &Path, console: &Console, part: impl FnOnce(&At) ->
         Remark::Assumed(what) => console.say(what),
         Remark::Doubt(what) => console.warn(what),
     };
-    part(&At { station, path: &|name| Ok(PathBuf::from(name)), confined: false, remark: &remark })
+    part(&At { station, names: &Typed, remark: &remark })
 }
 
 /// Shows a bar that counts the pictures of a calibration.

@@ -132,7 +132,7 @@ impl HandEyeOrder {
         let Some(poses) = &self.poses else {
             return Err(Fault::usage("board poses are given, and no robot poses").next("name their file as poses"));
         };
-        let robot = (at.path)(poses)?;
+        let robot = at.names.path(poses)?;
         at.doubts(load_poses(&robot)?.warnings);
         let board_sigma = self.board_sigma_mm.zip(self.board_sigma_deg).map(|(mm, deg)| [mm, deg.to_radians()]);
         if let Some([mm, rad]) = board_sigma.filter(|s| !s.iter().all(|s| *s > 0.0 && s.is_finite())) {
@@ -140,7 +140,7 @@ impl HandEyeOrder {
             return Err(Fault::usage(format!("board sigmas of {mm} mm and {deg} degrees, above 0 is allowed"))
                 .next("state the scatter of the other program's poses, or omit both options"));
         }
-        calibrate_hand_eye_from_poses(&PosePairs { robot, boards: (at.path)(boards)?, board_sigma }, rig, run)
+        calibrate_hand_eye_from_poses(&PosePairs { robot, boards: at.names.path(boards)?, board_sigma }, rig, run)
     }
 }
 

@@ -2,6 +2,7 @@
 //! here.
 //! Frame and unit: each record names its frames; mm, degrees.
 
+mod auto;
 mod axis;
 mod camera;
 mod hand_eye;
@@ -9,6 +10,7 @@ mod joint;
 mod laser_plane;
 mod pointer;
 
+pub use auto::AutoOrder;
 pub use axis::AxisOrder;
 pub use camera::CameraOrder;
 pub use hand_eye::HandEyeOrder;
@@ -75,8 +77,7 @@ impl Solved {
 
 /// Opens the recordings of an order. `leave_out` are frames that are not used, counted from 0 over all recordings.
 fn open(at: &At, names: &[&String], leave_out: &[usize]) -> Result<Vec<Recording>> {
-    let mut recordings =
-        names.iter().map(|name| Recording::open(&(at.path)(name)?)).collect::<Result<Vec<Recording>>>()?;
+    let mut recordings = names.iter().map(|name| at.recording(name)).collect::<Result<Vec<Recording>>>()?;
     let all: usize = recordings.iter().map(|r| r.meta.frames.len()).sum();
     if let Some(strange) = leave_out.iter().find(|i| **i >= all) {
         return Err(

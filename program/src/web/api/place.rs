@@ -80,7 +80,7 @@ fn smaller(image: &Image, width: Option<u32>) -> Image {
 
 /// GET /boards
 pub async fn boards(State(screen): State<Arc<Screen>>) -> Answer<Json<Vec<String>>> {
-    json(screen, |s| work::boards(&s.place)).await
+    json(screen, |s| Ok(s.place.boards())).await
 }
 
 /// GET /recipes

@@ -5,22 +5,39 @@
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, SchemaGenerator};
 use serde_json::{Map, Value, json};
-use ts_rs::TS;
+use std::collections::BTreeMap;
+use ts_rs::{TS, TypeVisitor};
 
-/// How a message is described.
+/// How a message is described, with all that it consists of.
 pub struct Message {
-    declared: fn() -> String,
+    declared: fn(&mut Declared),
     described: fn(&mut SchemaGenerator) -> schemars::Schema,
 }
 
 /// The description of one message.
-pub const fn message<T: TS + JsonSchema>() -> Message {
-    Message { declared: T::decl, described: SchemaGenerator::subschema_for::<T> }
+pub const fn message<T: TS + JsonSchema + 'static>() -> Message {
+    Message { declared: Declared::visit::<T>, described: SchemaGenerator::subschema_for::<T> }
+}
+
+/// TypeScript declarations by the names of their types.
+#[derive(Default)]
+struct Declared(BTreeMap<String, String>);
+
+impl TypeVisitor for Declared {
+    fn visit<T: TS + 'static + ?Sized>(&mut self) {
+        // A type of the language itself has no file, and no declaration.
+        if T::output_path().is_some() && !self.0.contains_key(&T::name()) {
+            self.0.insert(T::name(), T::decl());
+            T::visit_dependencies(self);
+        }
+    }
 }
 
 /// The messages' TypeScript declarations.
 pub fn declarations(messages: &[Message]) -> String {
-    let declared: Vec<String> = messages.iter().map(|message| format!("export {}", (message.declared)())).collect();
+    let mut declared = Declared::default();
+    messages.iter().for_each(|message| (message.declared)(&mut declared));
+    let declared: Vec<String> = declared.0.values().map(|text| format!("export {text}")).collect();
     format!(
         "// Made from program/src/web/message by the test `messages`; SHEETLIGHT_WRITE=1 makes it again.\n\n{}\n",
         declared.join("\n\n")

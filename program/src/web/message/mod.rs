@@ -19,7 +19,7 @@ mod sweep;
 
 use description::{Message, message};
 
-/// Lists the messages: what is not listed here is neither imported, declared nor described.
+/// Lists the messages that other rooms name. What they consist of is declared and described with them.
 macro_rules! messages {
     ($($($place:ident)::+ { $($message:ident,)+ })+) => {
         $(pub use $($place)::+::{$($message),+};)+
@@ -31,14 +31,15 @@ macro_rules! messages {
 messages! {
     bar { Bar, CalibrationAge, Frames, Lease, Mode, RobotState, }
     job { Event, Job, JobState, Problem, }
-    order { AutoOrder, BenchmarkOrder, FindOrder, InsertOrder, Order, Plain, TeachOrder, }
-    crate::procedure { ScanOrder, TouchOrder, }
+    order { BenchmarkOrder, Order, Outcome, Plain, TeachOrder, }
+    crate::procedure { FilterOrder, FindOrder, InsertOrder, ScanOrder, TouchOrder, }
+    crate::procedure::filter { Filter, }
     crate::procedure::calibrate {
-        AxisOrder, CalibrateOrder, CameraOrder, HandEyeOrder, JointOrder, LaserPlaneOrder, PointerOrder,
+        AutoOrder, AxisOrder, CalibrateOrder, CameraOrder, HandEyeOrder, JointOrder, LaserPlaneOrder, PointerOrder,
     }
-    filter { Filter, FilterOrder, Filtered, Filters, }
+    filter { Filtered, Filters, }
     outcome {
-        BenchRow, CalibrationFigures, CheckLine, GateLight, Inserted, KeptUp, Notation, Outcome, Position, Repeats,
+        BenchRow, CalibrationFigures, CheckLine, GateLight, Inserted, KeptUp, Notation, Position, Repeats,
         RepeatsAsk, RobotPoses, ScanFigures, Spread, SquareProposed, SurfaceTouched, Term, Touched,
     }
     camera { CameraFeature, CameraState, ExposureSet, PictureLook, SetFeature, StripeSeen, }

@@ -1,9 +1,9 @@
-//! In: nothing. Out: what an operator can order, as sent to the API and stored in job.json.
+//! In: nothing. Out: what an operator can order, and what comes of it, as sent over the API and stored in job.json.
 //! Frame and unit: mm, degrees; positions in a height map's grid.
 
-use super::FilterOrder;
-use crate::procedure::calibrate::{CalibrateOrder, JointOrder};
-use crate::procedure::{ScanOrder, TouchOrder};
+use super::{BenchRow, CalibrationFigures, CheckLine, ExposureSet, Inserted, KeptUp, Position, ScanFigures, Touched};
+use crate::procedure::calibrate::{AutoOrder, CalibrateOrder, JointOrder};
+use crate::procedure::{FilterOrder, FindOrder, InsertOrder, ScanOrder, TouchOrder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
@@ -42,6 +42,51 @@ pub enum Order {
     Benchmark(BenchmarkOrder),
 }
 
+/// Result of a job.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
+#[serde(tag = "procedure", rename_all = "snake_case")]
+pub enum Outcome {
+    /// Results of the checks.
+    Check {
+        /// In the order of the checks.
+        lines: Vec<CheckLine>,
+    },
+    /// Figures of the scan; its files are in the job's folder.
+    Scan(Box<ScanFigures>),
+    /// The tool's poses, or why there are none.
+    Find(Box<Position>),
+    /// The recipe, and a test on the scan that it was taught from.
+    Teach {
+        /// Name of the recipe.
+        recipe: String,
+        /// Result of finding the part in that scan.
+        proof: Box<Position>,
+    },
+    /// The surface that the pointer touched.
+    Touch(Box<Touched>),
+    /// The exposure that was set.
+    Tune(Box<ExposureSet>),
+    /// A calibration, to be accepted.
+    Calibrate(Box<CalibrationFigures>),
+    /// All calibrations of a rig together, to be accepted.
+    Joint(Box<CalibrationFigures>),
+    /// The same with motions of the robot.
+    Auto(Box<CalibrationFigures>),
+    /// The component is inserted.
+    Insert(Box<Inserted>),
+    /// Times per shot.
+    Benchmark {
+        /// One row per size and processor.
+        rows: Vec<BenchRow>,
+        /// Recorded rows of other machines.
+        #[serde(default)]
+        recorded: Vec<BenchRow>,
+        /// Measured and dropped pictures of a camera, at half and at full resolution.
+        #[serde(default)]
+        kept_up: Vec<KeptUp>,
+    },
+}
+
 /// No further input.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -55,54 +100,6 @@ pub struct BenchmarkOrder {
     #[serde(default)]
     #[ts(optional = nullable)]
     pub rate_hz: Option<f64>,
-}
-
-/// What to find, and in which scans.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct FindOrder {
-    /// Jobs that scanned.
-    pub scans: Vec<String>,
-    /// Name of the recipe.
-    pub recipe: String,
-    /// Two positions in the first scan's map, mm: the tool goes to the middle of the pins there; null: to the point
-    /// that the recipe names.
-    #[serde(default)]
-    #[ts(optional = nullable)]
-    pub pins: Option<[[f64; 2]; 2]>,
-}
-
-/// A calibration that moves the robot itself.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct AutoOrder {
-    /// Name of the board's description in the station's folder `boards`.
-    pub board: String,
-    /// The calibration ends when the expected error of a scanned point is at most this, mm rms.
-    pub target_mm: f64,
-    /// Most stops, 20 to 200; null: 40.
-    #[serde(default)]
-    #[ts(optional = nullable)]
-    pub most: Option<usize>,
-}
-
-/// An insertion.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct InsertOrder {
-    /// Name of the recipe.
-    pub recipe: String,
-    /// Length of the sweep about the picture's middle, mm; null: the field's short side.
-    #[serde(default)]
-    #[ts(optional = nullable)]
-    pub sweep_mm: Option<f64>,
-    /// Speed of every motion, mm/s; null: the station's.
-    #[serde(default)]
-    #[ts(optional = nullable)]
-    pub speed_mm_s: Option<f64>,
-    /// After an interruption, retract instead of continuing.
-    #[serde(default)]
-    pub back_out: bool,
 }
 
 /// A part taught by a few positions in a height map.

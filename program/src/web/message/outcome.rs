@@ -1,56 +1,10 @@
-//! In: nothing. Out: the result of each procedure, as shown by pages and stored in job.json.
+//! In: nothing. Out: what the results of procedures consist of, as shown by pages and stored in job.json.
 //! Frame and unit: mm, degrees, px; poses in the scan's frame.
 
-use super::ExposureSet;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use ts_rs::TS;
-
-/// Result of a job.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]
-#[serde(tag = "procedure", rename_all = "snake_case")]
-pub enum Outcome {
-    /// Results of the checks.
-    Check {
-        /// In the order of the checks.
-        lines: Vec<CheckLine>,
-    },
-    /// Figures of the scan; its files are in the job's folder.
-    Scan(Box<ScanFigures>),
-    /// The tool's poses, or why there are none.
-    Find(Box<Position>),
-    /// The recipe, and a test on the scan that it was taught from.
-    Teach {
-        /// Name of the recipe.
-        recipe: String,
-        /// Result of finding the part in that scan.
-        proof: Box<Position>,
-    },
-    /// The surface that the pointer touched.
-    Touch(Box<Touched>),
-    /// The exposure that was set.
-    Tune(Box<ExposureSet>),
-    /// A calibration, to be accepted.
-    Calibrate(Box<CalibrationFigures>),
-    /// All calibrations of a rig together, to be accepted.
-    Joint(Box<CalibrationFigures>),
-    /// The same with motions of the robot.
-    Auto(Box<CalibrationFigures>),
-    /// The component is inserted.
-    Insert(Box<Inserted>),
-    /// Times per shot.
-    Benchmark {
-        /// One row per size and processor.
-        rows: Vec<BenchRow>,
-        /// Recorded rows of other machines.
-        #[serde(default)]
-        recorded: Vec<BenchRow>,
-        /// Measured and dropped pictures of a camera, at half and at full resolution.
-        #[serde(default)]
-        kept_up: Vec<KeptUp>,
-    },
-}
 
 /// One check.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS, JsonSchema)]

@@ -176,14 +176,14 @@ impl Plc {
             scan.ok_or_else(|| Wrong::new(Code::Order, "no scan is finished: SCAN first, or scan on the screen"))?;
         self.order(false, |place| {
             recipe_named(place, &recipe)?;
-            Ok(Order::Find(FindOrder { scans: vec![scan.id], recipe, pins: None }))
+            Ok(Order::Find(FindOrder { scans: vec![scan.id], recipe, ..FindOrder::default() }))
         })
     }
 
     fn insert(&mut self, recipe: String, sweep_mm: Option<f64>) -> Result<Reply, Wrong> {
         self.order(true, |place| {
             recipe_named(place, &recipe)?;
-            Ok(Order::Insert(InsertOrder { recipe, sweep_mm, speed_mm_s: None, back_out: false }))
+            Ok(Order::Insert(InsertOrder { recipe, sweep_mm, ..InsertOrder::default() }))
         })
     }
 

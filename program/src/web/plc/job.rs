@@ -169,12 +169,7 @@ mod tests {
         Job {
             format: 1,
             id: "0012-insert".into(),
-            order: Order::Insert(InsertOrder {
-                recipe: "osc".into(),
-                sweep_mm: None,
-                speed_mm_s: None,
-                back_out: false,
-            }),
+            order: Order::Insert(InsertOrder { recipe: "osc".into(), ..InsertOrder::default() }),
             state,
             done: 0,
             of: None,

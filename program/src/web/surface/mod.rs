@@ -4,12 +4,10 @@
 mod fit;
 mod look;
 mod measure;
-mod pins;
 mod section;
 mod view;
 
 pub use look::{Looked, Maps};
 pub use measure::measure;
-pub use pins::between_pins;
 pub use section::section;
 pub use view::view;

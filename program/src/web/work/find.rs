@@ -3,44 +3,29 @@
 //! Frame and unit: the scan's frame, outlines in the height map's grid; mm, degrees.
 
 use super::found::{FOUND, RECIPE};
-use super::recipes::{load, save_recipe, vacant};
+use super::recipes::{save_recipe, vacant};
 use super::run::Run;
-use super::store::scan_of;
+use crate::procedure::{Located, Names};
 use crate::web::message::{FindOrder, GateLight, Notation, Outcome, Position, RobotPoses, TeachOrder, Term};
-use crate::web::surface::between_pins;
-use sheetlight::fault::{Fault, Result};
+use sheetlight::fault::Result;
 use sheetlight::find::insert::budget::Term as BudgetTerm;
 use sheetlight::find::insert::recipe::InsertionSpec;
 use sheetlight::find::insert::teach::TeachOptions;
-use sheetlight::find::{Accelerator, LocateOptions, Recipe, Report};
+use sheetlight::find::{Recipe, Report};
 use sheetlight::geometry::Vec3;
 use sheetlight::raster::RgbImage;
 use sheetlight::robot::Convention;
-use sheetlight::station::{Looked, Settings, find_part_in_all, teach_part};
-use std::path::PathBuf;
+use sheetlight::station::{Settings, teach_part};
 
-pub(super) fn find(this: &Run, ask: &FindOrder) -> Result<Outcome> {
-    let place = &this.jobs.place;
-    let (mut recipe, folders) = (load(place, &ask.recipe)?, scan_folders(this, &ask.scans)?);
-    let convention = Settings::load(&place.station)?.robot.unwrap_or(Convention::Matrix);
-    let options = LocateOptions { robot: convention, accelerator: Accelerator::open(), ..LocateOptions::default() };
-    let looked = Looked { scans: &folders, range: None };
-    let (mut report, mut picture) = find_part_in_all(&looked, &recipe, Some(&place.station), &options)?;
-    if let Some(places) = &ask.pins {
-        let grid_from_part = report.map.base_from_grid.inverse() * report.base_from_part;
-        recipe = between_pins(&recipe, &grid_from_part, places)?;
-        let of = recipe.construction.last().map(|c| c.of.join(", ")).unwrap_or_default();
-        (report, picture) = find_part_in_all(&looked, &recipe, Some(&place.station), &options)?;
-        report.notes.insert(0, format!("the tool goes where the middle of {of} says"));
-    }
+pub(super) fn find(this: &Run, order: &FindOrder) -> Result<Outcome> {
+    let Located { report, recipe, picture, notation } = order.find(this, Some(&this.jobs.place.station), false)?;
     keep(this, &report, &recipe, &picture)?;
-    Ok(Outcome::Find(Box::new(position(&report, &recipe, convention))))
+    Ok(Outcome::Find(Box::new(position(&report, &recipe, notation))))
 }
 
 pub(super) fn teach(this: &Run, order: &TeachOrder) -> Result<Outcome> {
     let place = &this.jobs.place;
     vacant(place, &order.name, order.replace)?;
-    let folders = scan_folders(this, std::slice::from_ref(&order.scan))?;
     let options = TeachOptions {
         name: order.name.clone(),
         outline: order.outline,
@@ -53,20 +38,13 @@ pub(super) fn teach(this: &Run, order: &TeachOrder) -> Result<Outcome> {
             order.approach_mm,
         ),
     };
-    let (recipe, proof, picture) = teach_part(&folders[0], &options)?;
+    let (recipe, proof, picture) = teach_part(&this.scan(&order.scan)?, &options)?;
     let text = toml::to_string(&recipe).expect("plain data");
     keep(this, &proof, &recipe, &picture)?;
     save_recipe(place, &order.name, &text, order.replace)?;
     let convention = Settings::load(&place.station)?.robot.unwrap_or(Convention::Matrix);
     let proof = Box::new(position(&proof, &recipe, convention));
     Ok(Outcome::Teach { recipe: order.name.clone(), proof })
-}
-
-fn scan_folders(this: &Run, scans: &[String]) -> Result<Vec<PathBuf>> {
-    if scans.is_empty() {
-        return Err(Fault::usage("no scan was chosen").next("choose one, or several scans of the same part"));
-    }
-    scans.iter().map(|id| scan_of(&this.jobs.place.jobs(), &this.jobs.get(id)?)).collect()
 }
 
 /// Stores report, picture and the recipe used; later edits of the recipe do not change them.

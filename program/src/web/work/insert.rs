@@ -10,15 +10,11 @@ use super::run::Run;
 use crate::web::message::{InsertOrder, Inserted, Outcome};
 use crate::web::motion::{Person, Session};
 use sheetlight::fault::{Fault, Kind, Result};
-use sheetlight::robot::Convention;
-use sheetlight::scan::Where;
 use sheetlight::station::Settings;
-use sheetlight::station::job::{Job, JobOptions, Outcome as Ended};
+use sheetlight::station::job::{Job, Outcome as Ended};
 
 /// Steps in their order, as the state machine names them.
 const STEPS: [&str; 5] = ["touch", "scan", "approach", "insert", "retract"];
-/// Largest angle between the touched board and the found part, degrees.
-const MAX_TILT_DEG: f64 = 3.0;
 
 pub(super) fn insert(this: &Run, order: &InsertOrder) -> Result<Outcome> {
     let place = &this.jobs.place;
@@ -31,17 +27,8 @@ pub(super) fn insert(this: &Run, order: &InsertOrder) -> Result<Outcome> {
     if !this.again || !path.is_file() {
         sheetlight::files::write(&path, toml::to_string(&recipe).expect("plain data").as_bytes())?;
     }
-    let robot = settings.robot.unwrap_or(Convention::Denso);
-    let options = JobOptions {
-        station: place.station.clone(),
-        recipe: path,
-        out: this.folder.join(INSERTION),
-        robot,
-        place: Where::default(),
-        speed_mm_s: order.speed_mm_s,
-        sweep_mm: order.sweep_mm,
-        max_tilt_deg: MAX_TILT_DEG,
-    };
+    let options = order.options(&place.station, &settings, path, this.folder.join(INSERTION));
+    let robot = options.robot;
     let mut session = Session::begin(desk, &this.id, &this.stop)?;
     let within_s = session.guard().limits().map_or(0.0, |l| l.max_shown_s);
     let step = |name: &str| {

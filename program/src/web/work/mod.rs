@@ -18,7 +18,7 @@ mod store;
 mod tune;
 mod worker;
 
-pub use calibrate::{Views, accept, boards};
+pub use calibrate::{Views, accept};
 pub use found::{insertion_of, lies, report_of};
 pub use jobs::Jobs;
 pub use place::Place;

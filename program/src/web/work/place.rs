@@ -7,7 +7,7 @@ use crate::web::message::{Mode, Problem, RecordingInfo};
 use sheetlight::capture::record::is_recorded_into;
 use sheetlight::fault::{Fault, Result};
 use sheetlight::files::natural;
-use sheetlight::recording::{Beam, MotionKind, Recording};
+use sheetlight::recording::{Beam, BoardSpec, MotionKind, Recording};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -32,13 +32,35 @@ impl Place {
     pub fn jobs(&self) -> PathBuf {
         self.station.join("jobs")
     }
-    /// Descriptions of calibration boards.
-    pub fn boards(&self) -> PathBuf {
-        self.station.join("boards")
-    }
     /// Recipes of this station.
     pub fn recipes(&self) -> PathBuf {
         self.station.join("recipes")
+    }
+
+    /// Names of the boards that the station describes, in natural order.
+    pub fn boards(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.station.join("boards")).into_iter().flatten().flatten();
+        let name = |e: std::fs::DirEntry| {
+            let path = e.path();
+            let name = path.file_stem()?.to_string_lossy().into_owned();
+            (path.extension()? == "json" && plain(&name)).then_some(name)
+        };
+        let mut names: Vec<String> = entries.filter_map(name).collect();
+        names.sort_by_key(|n| natural(n));
+        names
+    }
+
+    /// The description of one.
+    ///
+    /// # Errors
+    /// The station has none of that name, or it cannot be read.
+    pub fn board(&self, name: &str) -> Result<BoardSpec> {
+        if !self.boards().iter().any(|b| b == name) {
+            return Err(Fault::input(format!("{name:?}: is not a board of this station"))
+                .cause("its folder boards has no such description")
+                .next("write one with sheetlight board, and put its .json into STATION/boards"));
+        }
+        BoardSpec::load(&self.station.join("boards").join(format!("{name}.json")))
     }
 
     /// The recordings below their folder, in natural order. One that cannot be read is listed with the reason.

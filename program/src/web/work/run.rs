@@ -2,9 +2,13 @@
 //! Frame and unit: none.
 
 use super::jobs::Jobs;
-use crate::procedure::At;
+use super::recipes::load;
+use super::store::scan_of;
+use crate::procedure::{At, Names, Remark};
 use crate::web::guard::resolve;
 use sheetlight::fault::Result;
+use sheetlight::find::Recipe;
+use sheetlight::recording::BoardSpec;
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -33,18 +37,32 @@ impl Run {
     }
     /// Executes a part of the procedure on the station and the recordings of the job; returns its remarks, too.
     pub fn remarked<T>(&self, part: impl FnOnce(&At) -> Result<T>) -> Result<(T, Vec<String>)> {
-        let place = &self.jobs.place;
         let remarks = RefCell::new(Vec::new());
-        let result = part(&At {
-            station: &place.station,
-            path: &|name| resolve(&place.recordings, name),
-            confined: true,
-            remark: &|remark| remarks.borrow_mut().push(remark.words()),
-        })?;
+        let remark = |remark: Remark| remarks.borrow_mut().push(remark.words());
+        let result = part(&At { station: &self.jobs.place.station, names: self, remark: &remark })?;
         Ok((result, remarks.into_inner()))
     }
     /// Whether the run must end.
     pub fn stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
+    }
+}
+
+/// Recordings by their path below the recordings' folder, scans by their job, recipes and boards by their name.
+impl Names for Run {
+    fn path(&self, name: &str) -> Result<PathBuf> {
+        resolve(&self.jobs.place.recordings, name)
+    }
+    fn scan(&self, name: &str) -> Result<PathBuf> {
+        scan_of(&self.jobs.place.jobs(), &self.jobs.get(name)?)
+    }
+    fn recipe(&self, name: &str) -> Result<Recipe> {
+        load(&self.jobs.place, name)
+    }
+    fn board(&self, name: &str) -> Result<BoardSpec> {
+        self.jobs.place.board(name)
+    }
+    fn confined(&self) -> bool {
+        true
     }
 }

@@ -2,13 +2,12 @@
 //! Frame and unit: mm.
 
 use super::run::Run;
-use super::store::scan_of;
 use crate::procedure::{At, ScanOrder};
 use crate::web::message::{FilterOrder, Frames, Outcome, ScanFigures};
 use sheetlight::fault::Result;
 use sheetlight::recording::Recording;
 use sheetlight::rig::Rig;
-use sheetlight::station::{ScanOptions, ScanReport, Settings, Watch, filter_scan, scan_recording};
+use sheetlight::station::{ScanOptions, ScanReport, Settings, Watch, scan_recording};
 
 pub(super) fn scan(this: &Run, order: &ScanOrder) -> Result<Outcome> {
     let place = &this.jobs.place;
@@ -41,10 +40,8 @@ pub(super) fn scan(this: &Run, order: &ScanOrder) -> Result<Outcome> {
 }
 
 /// Stores a filtered copy of a scan in a separate job.
-pub(super) fn filter(this: &Run, asked: &FilterOrder) -> Result<Outcome> {
-    let scan = scan_of(&this.jobs.place.jobs(), &this.jobs.get(&asked.scan)?)?;
-    let filters: Vec<_> = asked.filters.iter().map(|f| (*f).into()).collect();
-    Ok(Outcome::Scan(Box::new(figures(filter_scan(&scan, &filters, &this.folder.join("scan"))?))))
+pub(super) fn filter(this: &Run, order: &FilterOrder) -> Result<Outcome> {
+    Ok(Outcome::Scan(Box::new(figures(order.filter(this, &this.folder.join("scan"))?))))
 }
 
 /// Counts frames and extends the height map that pages show.

@@ -8,7 +8,6 @@ mod together;
 mod views;
 
 pub(super) use auto::auto;
-pub use auto::boards;
 pub use one::accept;
 pub(super) use one::calibrate;
 pub(super) use together::joint;

@@ -66,7 +66,7 @@ mod tests {
     use sheetlight::find::Drawing;
 
     fn led() -> Recipe {
-        Recipe::parse(include_str!("../../../../data/recipes/led.toml")).unwrap()
+        Recipe::parse(include_str!("../../../data/recipes/led.toml")).unwrap()
     }
 
     /// The part, rotated by 30 degrees about its datum.
