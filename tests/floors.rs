@@ -78,6 +78,7 @@ const HOMES: &[(&str, &str)] = &[
     ("notify", "capture"),
     ("parquet", "station"),
     ("png", "raster"),
+    ("zune_jpeg", "raster"),
     ("pollster", "gpu"),
     ("prost", "web"),
     ("rpassword", "cli"),
