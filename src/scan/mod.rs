@@ -35,6 +35,7 @@ pub use map::filter::{Filter, MOST_FILTERS};
 pub use map::grid::{grid, grid_on};
 pub use map::heightmap::HeightMap;
 pub use map::picture::{MapPlace, Shown};
+pub(crate) use map::spec::FEW_CELLS;
 pub use map::spec::{GridOptions, GridSpec};
 pub use pcd::write_pcd;
 pub use processor::{Processor, Where, Why};

@@ -11,7 +11,9 @@ use crate::files::Lock;
 use crate::geometry::Vec3;
 use crate::recording::Motion;
 use crate::rig::hash_text;
-use crate::scan::{CloudWriter, Extraction, Format, GridOptions, Lines, Stated, lines, read_foreign_page};
+use crate::scan::{
+    CloudPoint, CloudWriter, Extraction, FEW_CELLS, Format, GridOptions, Lines, Stated, lines, read_foreign_page,
+};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
@@ -57,7 +59,8 @@ pub fn import_map(
     let mut cloud = CloudWriter::create_in(&cloud_path, FRAME)?;
     cloud.append(&made.points)?;
     let points = cloud.finish()?;
-    let (height_map, files) = products::write(&part, &cloud_path, points, &GridOptions::default(), Vec3::z(), None)?;
+    let grid = GridOptions { cell: cell_of(&made, stated), ..GridOptions::default() };
+    let (height_map, files) = products::write(&part, &cloud_path, points, &grid, Vec3::z(), None)?;
     let imported = Imported {
         file: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         sha256,
@@ -76,6 +79,48 @@ pub fn import_map(
     crate::files::write(&part.join("scan.json"), text.as_bytes())?;
     folder.commit()?;
     Ok(report)
+}
+
+/// The cell that holds one point of the file's raster, or as few as the map's size allows; `None`: the points lie on no
+/// raster. Of pixels that are not square the longer side counts: a cell that is narrower would often be empty.
+fn cell_of(lines: &Lines, stated: &Stated) -> Option<f64> {
+    let [along, across] = stated.spacing_mm.or_else(|| spacing_of(&lines.points))?;
+    let places = lines.size[0] as f64 * lines.size[1] as f64;
+    Some(along.max(across) * (places / FEW_CELLS as f64).sqrt().ceil())
+}
+
+/// Distance of neighbours in a line, and of lines, mm, if nearly all are as far apart.
+fn spacing_of(points: &[CloudPoint]) -> Option<[f64; 2]> {
+    let apart = |a: &CloudPoint, b: &CloudPoint| {
+        f64::from((a.position[0] - b.position[0]).hypot(a.position[1] - b.position[1]))
+    };
+    let lines: Vec<&[CloudPoint]> = points.chunk_by(|a, b| a.shot == b.shot).collect();
+    let in_line = |line: &&[CloudPoint]| -> Vec<f64> {
+        line.windows(2).filter(|w| w[1].u == w[0].u + 1.0).map(|w| apart(&w[0], &w[1])).collect()
+    };
+    let between = |pair: &[&[CloudPoint]]| -> Vec<f64> {
+        if pair[1][0].shot != pair[0][0].shot + 1 {
+            return Vec::new();
+        }
+        let beside = |a: &CloudPoint| {
+            let at = pair[1].binary_search_by(|b| b.u.total_cmp(&a.u)).ok()?;
+            Some(apart(a, &pair[1][at]))
+        };
+        pair[0].iter().filter_map(beside).collect()
+    };
+    Some([regular(lines.iter().flat_map(in_line).collect())?, regular(lines.windows(2).flat_map(between).collect())?])
+}
+
+/// The median of distances, with four digits, if nine of ten are within a hundredth of it.
+fn regular(mut apart: Vec<f64>) -> Option<f64> {
+    if apart.is_empty() {
+        return None;
+    }
+    let middle = apart.len() / 2;
+    let median = *apart.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let like = apart.iter().filter(|d| (*d / median - 1.0).abs() < 0.01).count();
+    let digit = 10f64.powi(median.log10().floor() as i32 - 3);
+    (median > 0.0 && 10 * like >= 9 * apart.len()).then(|| (median / digit).round() * digit)
 }
 
 /// The report of an imported scan: what was not measured is empty.

@@ -75,6 +75,23 @@ mod tests {
     }
 
     #[test]
+    fn points_on_a_raster_as_fine_as_the_cells_fill_each_cell_once() {
+        for cell in [0.2, 0.1, 0.4] {
+            let options = GridOptions { cell: Some(cell), ..Default::default() };
+            for turn in [0.0, 1.0, 30.0f64] {
+                let place = Rigid::from_vectors(&Vec3::new(0.0, turn.to_radians(), 0.0), Vec3::new(28.3, -31.7, 5.0));
+                let map = grid(&plate(&place), &options).unwrap();
+                let (points, cells) = (200.0 * 150.0, f64::from(map.width) * f64::from(map.height));
+                // Of finer cells most are empty; each point still has one of its own.
+                let least = if cell < 0.2 { 1 } else { (cell / 0.2).round().powi(2) as u32 };
+                let full = map.count.iter().filter(|n| **n == least).count() as f64;
+                let share = full / if cell < 0.2 { points } else { cells };
+                assert!(share > 0.97, "cells of {cell} mm, {turn} degrees: {share} of them hold {least}");
+            }
+        }
+    }
+
+    #[test]
     fn a_given_grid_is_filled_exactly() {
         let frame = Rigid::<Base, Grid>::identity();
         let options =

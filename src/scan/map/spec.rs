@@ -113,7 +113,12 @@ pub fn choose(source: &(impl PointSource + ?Sized), options: &GridOptions) -> Re
         round(wished).max(up(least)).clamp(1e-4, 500.0)
     });
     let layer = options.layer.unwrap_or_else(|| (SLOPE * cell).max(6.0 * sample.sigma));
-    let shift = if options.base_from_grid.is_some() { Vec3::zeros() } else { Vec3::new(x0, y0, 0.0) };
+    let shift = if options.base_from_grid.is_some() {
+        Vec3::zeros()
+    } else {
+        let [x, y] = [(0, x0), (1, y0)].map(|(axis, first)| beside_the_points(&local, axis, first, cell));
+        Vec3::new(x0 - x, y0 - y, 0.0)
+    };
     let base_from_grid = Rigid::new(base_from_grid.rotation, base_from_grid.point(&shift));
     let [width, height] = options.cells.map_or_else(
         || [(x1 - shift.x) / cell, (y1 - shift.y) / cell].map(|n| n.ceil().max(1.0)),
@@ -138,6 +143,28 @@ pub fn choose(source: &(impl PointSource + ?Sized), options: &GridOptions) -> Re
         layer_steps,
         most_intensity: sample.most_intensity,
     })
+}
+
+/// Distance of the first cell's edge from the first point along an axis, mm, 0 for most scans. Points on a raster as
+/// fine as the cells would lie on edges between these, where rounding puts two of them into one cell and none into the
+/// next: the edges go through the middle of the widest gap between the points' places in their cells instead.
+fn beside_the_points(points: &[Vec3], axis: usize, first: f64, cell: f64) -> f64 {
+    const BINS: usize = 64;
+    /// A narrower gap, in bins, tells of no raster.
+    const LEAST: usize = BINS / 8;
+    let mut taken = [false; BINS];
+    // Places are counted from half a bin before the first point, so that rounding does not part those that are equal.
+    for p in points {
+        let place = ((p[axis] - first) / cell + 0.5 / BINS as f64).rem_euclid(1.0);
+        taken[(place * BINS as f64) as usize % BINS] = true;
+    }
+    let free = |start: usize| (0..BINS).take_while(|k| !taken[(start + k) % BINS]).count();
+    let (start, width) = (0..BINS).map(|start| (start, free(start))).max_by_key(|(_, width)| *width).unwrap_or((0, 0));
+    if width < LEAST {
+        return 0.0;
+    }
+    let edge = (start as f64 + 0.5 * width as f64 - 0.5) / BINS as f64;
+    cell * (1.0 - edge).rem_euclid(1.0)
 }
 
 pub struct Sample {
