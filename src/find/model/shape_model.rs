@@ -252,8 +252,9 @@ pub struct Edge {
     pub strength: f64,
 }
 
-/// Ridges of the slope's magnitude inside `[x0, y0, x1, y1)`, above both `contrast` times the 95th percentile there and
-/// three times the noise, with at least two neighbours of similar direction.
+/// Ridges of the slope's magnitude inside `[x0, y0, x1, y1)` above three times the noise and above `contrast` times the
+/// 95th percentile of those, with at least two neighbours of similar direction. The noise has ridges of its own: in a
+/// region that is mostly even they are nearly all, and would set the percentile.
 pub fn edges(field: &Field, [x0, y0, x1, y1]: [usize; 4], contrast: f64) -> Vec<Edge> {
     let w = field.width;
     let (x0, y0) = (x0.max(2), y0.max(2));
@@ -280,13 +281,13 @@ pub fn edges(field: &Field, [x0, y0, x1, y1]: [usize; 4], contrast: f64) -> Vec<
             }
         }
     }
-    let mut strengths: Vec<f64> = ridge.iter().map(|r| r.1.strength).collect();
+    let least = 3.0 * f64::from(field.noise());
+    let mut strengths: Vec<f64> = ridge.iter().map(|r| r.1.strength).filter(|s| *s >= least).collect();
     if strengths.is_empty() {
         return vec![];
     }
     let top = strengths.len() * 95 / 100;
-    let limit =
-        (contrast * *strengths.select_nth_unstable_by(top, f64::total_cmp).1).max(3.0 * f64::from(field.noise()));
+    let limit = (contrast * *strengths.select_nth_unstable_by(top, f64::total_cmp).1).max(least);
     let mut on = vec![u32::MAX; w * field.height];
     let strong: Vec<(usize, Edge)> = ridge.into_iter().filter(|r| r.1.strength >= limit).collect();
     for (k, r) in strong.iter().enumerate() {
