@@ -3,7 +3,7 @@
 //! Frame and unit: pixels; board and camera frames in mm.
 
 use super::bundle::{Bent, Corner, State};
-use super::choice::{Doubt, by_evidence, by_families, by_shape, resized, shaped};
+use super::choice::{Doubt, by_evidence, by_families, by_folding, by_shape, resized, shaped};
 use super::fit::Fit;
 use super::lens::Lens;
 use super::zhang::{Seen, first_camera};
@@ -160,6 +160,7 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
         doubts = by_families(&fit, &mut solution, &mut held);
         resized(&mut fit, &mut solution, &held);
         by_evidence(&fit, &mut solution, &mut held);
+        doubts.extend(by_folding(&fit, &mut solution, &mut held));
     }
     // From the chosen optimum this takes a step or two, and shows whether it is a minimum.
     let (solution, end) = fit.fine(&held, solution.state).ended().ok_or_else(unsolved)?;

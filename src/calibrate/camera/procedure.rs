@@ -345,7 +345,9 @@ impl Evidence<'_> {
             });
         }
         j.at_best(Verdict::BadlyDetermined, quality::folds(&solved.intrinsics), || {
-            "the lens model folds back inside the image".into()
+            "the lens model folds back inside the image: take boards nearer to its corners, or ask for fewer terms (--lens \
+             four)"
+                .into()
         });
         j.at_best(Verdict::Usable, self.covered < 0.6, || {
             format!(
@@ -436,9 +438,11 @@ fn further_parameters(solved: &Solved, lens: Lens) -> Option<String> {
 /// The terms that pictures ask for and that are not believed, in words.
 fn doubted(doubt: &Doubt) -> String {
     let name: &str = doubt.lens.into();
+    let why =
+        if doubt.folds { "the lens would fold back inside the image" } else { "no more than print, blur and light" };
     format!(
-        "the {name} terms are not estimated: they explain {:.3} px, no more than print, blur and light; they would \
-         move the viewing rays by {:.2} px, and half of that is in the uncertainty",
+        "the {name} terms are not estimated: they explain {:.3} px, {why}; they would move the viewing rays by {:.2} px, \
+         and half of that is in the uncertainty",
         doubt.explained_px, doubt.rays_px
     )
 }

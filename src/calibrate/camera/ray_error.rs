@@ -59,7 +59,7 @@ pub fn expected_ray_error(k: &Intrinsics, covariance: &ParameterMatrix) -> f64 {
 }
 
 /// The same at some pixels only, after the rotation that suits these best.
-pub(super) fn expected_ray_error_at(
+pub(in crate::calibrate::camera) fn expected_ray_error_at(
     k: &Intrinsics,
     covariance: &ParameterMatrix,
     at: impl Iterator<Item = Vec2>,

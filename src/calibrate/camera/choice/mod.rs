@@ -7,7 +7,7 @@ mod families;
 mod held_out;
 mod shape;
 
-pub(super) use evidence::by_evidence;
+pub(super) use evidence::{by_evidence, by_folding};
 pub use families::Doubt;
 pub(super) use families::by_families;
 pub(super) use shape::{by_shape, resized, shaped};
