@@ -94,11 +94,17 @@ fn load_file(path: &Path) -> Result<Read> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let read = match () {
         () if text.contains("opencv-matrix") => from_yaml(&text, &stem).map(Read::from),
+        // Its brackets are those of units.
+        () if has_header(&text) => read_csv(&text, &stem),
         () if text.contains('[') => from_brackets(&text, &stem).map(Read::from),
         () => read_csv(&text, &stem),
     };
     read.map_err(|e| e.at(path.display()))
 }
+
+/// Names of the column with a profile's number.
+const NUMBERS: [&str; 8] =
+    ["profile", "profile_index", "profile_id", "profile_number", "frame", "frame_index", "frame_id", "index"];
 
 /// What the columns of a table hold.
 enum Columns {
@@ -117,7 +123,7 @@ impl Columns {
                 c == key || c == format!("{key}_mm") || c == format!("{key} mm") || c == format!("{key} [mm]")
             })
         };
-        let profile = find("profile").or(find("frame")).or(find("index"));
+        let profile = NUMBERS.iter().find_map(|key| find(key));
         Some(Columns::Point { profile, x: find("x")?, z: find("z")? })
     }
 
@@ -139,14 +145,29 @@ pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
     read_csv(text, stem)?.in_order()
 }
 
+/// The first line of a table that is no comment, and the separator of its cells.
+fn head(text: &str) -> (&str, char) {
+    let first = text.lines().map(str::trim).find(|l| !l.is_empty() && !l.starts_with('#')).unwrap_or_default();
+    (first, [';', ','].into_iter().find(|c| first.contains(*c)).unwrap_or(' '))
+}
+
+/// Whether the first line names the columns of points.
+fn has_header(text: &str) -> bool {
+    let (first, separator) = head(text);
+    table(first, separator).first().is_some_and(|row| Columns::named(&row.cells).is_some())
+}
+
 fn read_csv(text: &str, stem: &str) -> Result<Read> {
     stated_mm(text, "export the profiles in mm")?;
-    let first = text.lines().map(str::trim).find(|l| !l.is_empty() && !l.starts_with('#')).unwrap_or_default();
-    let separator = [';', ','].into_iter().find(|c| first.contains(*c)).unwrap_or(' ');
+    let (_, separator) = head(text);
     let mut columns: Option<Columns> = None;
+    // Number of columns that a header names.
+    let mut named = usize::MAX;
     let mut out: Vec<Profile> = Vec::new();
     let mut numbers: Vec<Option<f64>> = Vec::new();
     for TableRow { line: number, text: line, mut cells } in table(text, separator) {
+        // An empty cell under a name is a missing value, as pandas and spreadsheets write it.
+        let missing = cells.len() >= named;
         // A separator at the end of a line starts no new cell.
         while cells.last().is_some_and(String::is_empty) {
             cells.pop();
@@ -160,6 +181,7 @@ fn read_csv(text: &str, stem: &str) -> Result<Read> {
         if columns.is_none() {
             if cells.iter().any(|c| c.parse::<f64>().is_err()) {
                 columns = Some(Columns::named(&cells).ok_or_else(|| bad("names no columns x and z"))?);
+                named = cells.len();
                 continue;
             }
             columns = Some(Columns::counted(cells.len()));
@@ -172,7 +194,10 @@ fn read_csv(text: &str, stem: &str) -> Result<Read> {
             continue;
         };
         let cell = |i: usize| cells.get(i).map(String::as_str).ok_or_else(|| bad("is too short"));
-        let value = |i: usize| cell(i).and_then(|c| c.parse::<f64>().map_err(|_| bad("is not a row of numbers")));
+        let value = |i: usize| match cells.get(i).map(String::as_str) {
+            None | Some("") if missing => Ok(f64::NAN),
+            _ => cell(i).and_then(|c| c.parse::<f64>().map_err(|_| bad("is not a row of numbers"))),
+        };
         let point = [value(x)?, value(z)?];
         let name = match profile {
             Some(i) => format!("{stem} {}", cell(i)?),
@@ -260,6 +285,21 @@ fn matrix(body: &str) -> std::result::Result<Vec<[f64; 2]>, String> {
 mod tests {
     use super::super::measured;
     use super::*;
+
+    #[test]
+    fn tables_of_pandas_and_spreadsheets_are_read_as_they_come() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p.csv");
+        // Units in brackets, a value that is missing, a number under one of its names.
+        std::fs::write(&path, "\u{feff}profile_index,x [mm],z [mm]\n0,1,10\n0,1.5,\n0,2,11.5\n1,4,\n1,5,6\n").unwrap();
+        let read = load(&path).unwrap();
+        assert_eq!(read.len(), 2);
+        assert!(read[0].points.len() == 3 && !measured(&read[0].points[1]) && !measured(&read[1].points[0]));
+        assert_eq!((read[0].points[2], read[1].points[1]), ([2.0, 11.5], [5.0, 6.0]));
+        // Without a header, and with a cell too few, nothing is known to be missing.
+        assert!(from_csv("0,1,10\n0,2,\n", "a").is_err());
+        assert!(from_csv("profile,x,z\n0,1,10\n0,2\n", "a").is_err());
+    }
 
     #[test]
     fn every_layout_gives_the_same_points() {
