@@ -40,6 +40,7 @@ impl Done<'_> {
         if state.cut > 0 {
             state.peaks.insert("beyond the list: more than a twentieth of the pictures lit".into(), state.cut);
         }
+        let levels = self.seen.remark();
         ScanReport {
             format: FORMAT,
             program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),
@@ -77,6 +78,7 @@ impl Done<'_> {
                 .into_iter()
                 .chain(self.source.remarks())
                 .chain(scanner.remark())
+                .chain(levels)
                 .chain(state.repeats.remarks())
                 .chain(self.calibrated.and_then(|c| state.depths.remark(&c)))
                 .chain(self.stopped)

@@ -111,6 +111,23 @@ impl Seen {
         )
     }
 
+    /// A warning if the levels end where those of a camera of fewer bits would.
+    pub fn remark(&self) -> Option<String> {
+        let most = (10..16).map(|bits| (1u16 << bits) - 1).find(|most| self.brightest_level <= *most)?;
+        // Above three quarters the pictures reach the top of that depth; darker ones may be of any.
+        let reached = u32::from(self.brightest_level) * 4 > u32::from(most) * 3;
+        let deep = u32::from(self.full_scale) >= 16 * u32::from(most);
+        (reached && deep).then(|| {
+            format!(
+                "no level exceeds {} of {}: if the camera has {} bits, state that as image.bits in meta.json (or with \
+                 --raw), or the stripe counts as too faint",
+                self.brightest_level,
+                self.full_scale,
+                most.count_ones()
+            )
+        })
+    }
+
     /// Likely cause and next step if nothing was measured.
     pub fn why(&self) -> (&'static str, &'static str) {
         let full = f64::from(self.full_scale);
@@ -187,5 +204,13 @@ mod tests {
         };
         assert!(white(255).why().0.contains("white") && white(3).why().0.contains("dark"));
         assert_eq!(white(255).light_px, None);
+        // Twelve bits in a file of sixteen; a picture of sixteen that is dark, or bright.
+        let remark = |bits, level| {
+            let mut seen = Seen::default();
+            seen.look(0, &Image::from_u16(8, 8, bits, vec![level; 64]));
+            seen.remark()
+        };
+        assert!(remark(16, 3900).unwrap().contains("12 bits"), "{:?}", remark(16, 3900));
+        assert!([(16, 2500), (16, 20_000), (12, 1000), (10, 1000)].iter().all(|(b, l)| remark(*b, *l).is_none()));
     }
 }
