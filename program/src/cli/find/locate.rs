@@ -41,7 +41,8 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let scans: Vec<&Path> = args.order.scans.iter().map(Path::new).collect();
     let inputs = Inputs { files: &[Path::new(&args.order.recipe)], scans: &scans, station: args.station.as_deref() };
     outputs::check(&[&args.out, &image], &inputs)?;
-    let Located { report, picture, .. } = args.order.find(&Typed, args.station.as_deref(), true)?;
+    let found = args.order.find(&Typed, args.station.as_deref(), true);
+    let Located { report, picture, .. } = found.inspect_err(|_| outdated(&args.out, &image, console))?;
     let text = serde_json::to_string_pretty(&report).expect("plain data");
     sheetlight::files::write_beside((&args.out, text.as_bytes()), &[(&image, &picture.to_png())])?;
     console.result(&report, &summary(&report));
@@ -56,6 +57,20 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             "the part is hidden in part, another one, or too badly seen"
         })
         .next(format!("look at {}", image.display())))
+}
+
+/// Renames the report of an earlier search: a program that reads it would insert where the part was then.
+fn outdated(report: &Path, picture: &Path, console: &Console) {
+    for path in [report, picture].into_iter().filter(|path| path.is_file()) {
+        let end = path.extension().unwrap_or_default().to_string_lossy();
+        let former = path.with_extension(format!("former.{end}"));
+        match std::fs::rename(path, &former) {
+            Ok(()) => {
+                console.warn(format!("{} is of an earlier search: it is now {}", path.display(), former.display()))
+            }
+            Err(e) => console.warn(format!("{} is of an earlier search ({e})", path.display())),
+        }
+    }
 }
 
 pub(super) fn summary(r: &Report) -> String {
