@@ -72,6 +72,46 @@ fn halcons_polynomial_is_turned_round_and_its_division_refused() {
     assert!(refused.what.contains("kappa is -2253.5") && !refused.next.is_empty(), "{refused}");
 }
 
+/// A camera without a lens measures wrongly, so a key that is not recognised must not become zeros.
+#[test]
+fn a_lens_is_read_under_any_spelling_or_the_file_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let load = |text: &str| {
+        let path = dir.path().join("c.txt");
+        std::fs::write(&path, text).unwrap();
+        Values::load(&path)
+    };
+    let five = truth(&[-0.21, 0.07, 3e-4, -7.25e-5, 0.01]);
+    let json = std::fs::read_to_string(file("opencv.json")).unwrap();
+    for key in ["dist_coeff", "dist_coefs", "distortion", "distortionCoefficients", "DistCoeffs", "distortion_params"] {
+        let values = load(&json.replace("distortion_coefficients", key)).unwrap();
+        assert_eq!(values.intrinsics, Some(five), "{key}");
+        let said = values.read_as.unwrap();
+        assert!(said.contains(&format!("5 lens terms k1 k2 p1 p2 k3 ... of '{key}'")), "{said}");
+    }
+    let ros = std::fs::read_to_string(file("ros2_echo.yaml")).unwrap();
+    let list = "d:\n- -0.21\n- 0.07\n- 0.0003\n- -7.25e-05\n- 0.01\n";
+    assert!(ros.contains(list));
+    let empty = load(&ros.replace(list, "d: []\n")).unwrap();
+    assert!(empty.intrinsics == Some(truth(&[0.0; 5])) && empty.read_as.unwrap().contains("no lens terms"));
+    let kalibr = std::fs::read_to_string(file("kalibr.yaml")).unwrap();
+    let matlab = std::fs::read_to_string(file("matlab.json")).unwrap();
+    let defaults = load(&matlab.replace("\"RadialDistortion", "\"Radial")).unwrap();
+    assert!(defaults.read_as.unwrap().contains("RadialDistortion is not there: zeros"));
+    let halcon = std::fs::read_to_string(file("halcon_polynomial.dat")).unwrap();
+    for (text, wanted) in [
+        (json.replace("distortion_coefficients", "cam_dist"), "does not state its lens"),
+        (ros.replace(list, ""), "does not state its lens"),
+        (json.replace("\"flags\": 0", "\"D\": [0, 0, 0, 0, 0]"), "two lenses that differ"),
+        (kalibr.replace("  distortion_model: radtan\n", ""), "has no distortion_model"),
+        (kalibr.replace("radtan", "none"), "distortion_model is 'none'"),
+        (halcon.replace("Poly1:poly1", "Other:other"), "has no Poly1"),
+    ] {
+        let fault = load(&text).err().unwrap_or_else(|| panic!("'{wanted}' was taken: {text}"));
+        assert!(fault.what.contains(wanted) && !fault.next.is_empty(), "'{wanted}' is not in: {fault}");
+    }
+}
+
 #[test]
 fn what_the_lens_cannot_say_is_refused_by_its_name() {
     let dir = tempfile::tempdir().unwrap();
