@@ -40,6 +40,7 @@ pub fn camera(text: &str) -> Result<Option<(Intrinsics, String)>> {
             }
             (opencv, &file)
         };
+    projection::check(map)?;
     read(one).map(Some)
 }
 
@@ -114,9 +115,6 @@ fn opencv(file: &Value) -> Result<(Intrinsics, String)> {
     let model = file.get("distortion_model").and_then(Value::as_str).unwrap_or("");
     if !matches!(model, "" | "plumb_bob" | "rational_polynomial" | "thin_prism" | "none") {
         return Err(projection::another("distortion_model", &model.into()));
-    }
-    if let Some(flag) = file.get("fisheye_model").filter(|v| v.as_f64().is_some_and(|x| x != 0.0)) {
-        return Err(projection::another("fisheye_model", flag));
     }
     let (terms, lens) = lens::terms(map)?;
     let distortion = Distortion::from_opencv(&terms).expect("counted there");
