@@ -3,6 +3,7 @@
 //! Frame and unit: keys as in the reference data's format: `flange_T_camera`, mm, row-major.
 
 use super::assumed::{Assumed, Sigmas};
+use super::sound;
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Axis, AxisKind, Base, Camera, ORTHONORMAL_WARN, Plane, Ray, Rigid, Vec3};
@@ -161,6 +162,8 @@ impl Values {
         if !as_stated {
             self.intrinsics.as_ref().map_or(Ok(()), of_its_pictures).map_err(|e| e.at(source.display()))?;
         }
+        let at_source = |e: Fault| e.at(source.display());
+        self.intrinsics.as_ref().map_or(Ok(()), sound::lens).map_err(at_source)?;
         let rig = Rig { camera, laser_plane, pointer, hand_eye, base_camera, linear_axis, turntable, ..Rig::default() };
         if !as_stated {
             rig.records().into_iter().try_for_each(Record::likely)?;

@@ -3,6 +3,7 @@
 mod assumed;
 mod exchange;
 mod foreign;
+mod sound;
 mod stated;
 
 pub use assumed::Sigmas;
