@@ -164,6 +164,9 @@ impl Values {
         }
         let at_source = |e: Fault| e.at(source.display());
         self.intrinsics.as_ref().map_or(Ok(()), sound::lens).map_err(at_source)?;
+        if let (Some(camera), Some(plane)) = (with, &laser_plane) {
+            sound::plane(&camera.value, &plane.value).map_err(at_source)?;
+        }
         let rig = Rig { camera, laser_plane, pointer, hand_eye, base_camera, linear_axis, turntable, ..Rig::default() };
         if !as_stated {
             rig.records().into_iter().try_for_each(Record::likely)?;
