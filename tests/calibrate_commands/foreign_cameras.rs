@@ -1,7 +1,7 @@
 //! Cameras in the files of other programs: values and conventions are those that the programs state. The OpenCV files
 //! were written by OpenCV 5; the others are laid out as their programs write them.
 
-use crate::common::{sheetlight, sheetlight_fails};
+use crate::common::{program, sheetlight, sheetlight_fails};
 use sheetlight::camera::{Distortion, Intrinsics};
 use sheetlight::geometry::Vec3;
 use sheetlight::rig::Rig;
@@ -160,6 +160,26 @@ fn a_matrix_of_pictures_of_another_size_is_asked_about() {
         assert!(said.contains("principal point") && said.contains("--as-stated"), "{size:?}: {said}");
         sheetlight(&[&import[..], &["--as-stated"]].concat());
     }
+}
+
+#[test]
+fn an_import_says_how_it_read_the_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let station = dir.path().join("st").to_str().unwrap().to_owned();
+    let from = file("ros2_echo.yaml");
+    let import = ["station", "import", from.to_str().unwrap(), "--station", &station];
+    let said = sheetlight(&[&["--json"], &import[..]].concat());
+    let result: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(result["stored"], serde_json::json!(["camera"]));
+    let remarks = result["remarks"].as_array().unwrap();
+    let has = |words: &str| remarks.iter().any(|r| r.as_str().unwrap().contains(words));
+    assert!(has("camera: read as ROS (camera_info) writes it") && has("binning 2 x 2"), "{said}");
+    assert!(has("assumed at the import"), "{said}");
+    // On the console the remarks are messages, not data.
+    let done = std::process::Command::new(program()).args(import).output().unwrap();
+    let talk = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success() && talk.contains("binning 2 x 2"), "{talk}");
+    assert!(!String::from_utf8_lossy(&done.stdout).contains("binning"));
 }
 
 #[test]

@@ -186,6 +186,20 @@ impl Values {
     }
 }
 
+/// The reason that every imported record states for its verdict.
+const AS_ITS_SOURCE: &str = "imported: the values are as good as their source";
+
+/// What the records of these kinds state about their import: the program that wrote the file, what was assumed of it or
+/// repaired, and the remarks of the rig's reports.
+pub fn remarks_of_import(rig: &Rig, kinds: &[Kind]) -> Vec<String> {
+    let of = |r: &dyn Record| -> Vec<String> {
+        let reasons = r.quality().reasons.iter().filter(|said| *said != AS_ITS_SOURCE);
+        reasons.map(|said| format!("{}: {said}", r.kind().words())).collect()
+    };
+    let stored = rig.records().into_iter().filter(|r| kinds.contains(&r.kind()));
+    stored.flat_map(of).chain(rig.remarks()).collect()
+}
+
 fn no_length(key: &str) -> Fault {
     Fault::input(format!("{key} has no length")).cause("all zeros").next("give a direction")
 }
@@ -235,10 +249,9 @@ fn imported<T: serde::Serialize>(
     note: Option<String>,
     source: &Path,
 ) -> Result<Calibration<T>> {
-    let source_says = "imported: the values are as good as their source".to_owned();
     let quality = Quality {
         verdict: Verdict::Usable,
-        reasons: std::iter::once(source_says).chain(note).collect(),
+        reasons: std::iter::once(AS_ITS_SOURCE.to_owned()).chain(note).collect(),
         advice: vec![],
         figures: Default::default(),
         per_picture: vec![],

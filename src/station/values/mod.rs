@@ -7,5 +7,5 @@ mod sound;
 mod stated;
 
 pub use assumed::Sigmas;
-pub use exchange::{PlaneValue, Values};
+pub use exchange::{PlaneValue, Values, remarks_of_import};
 pub use foreign::{Format as ValuesFormat, written as written_camera};
