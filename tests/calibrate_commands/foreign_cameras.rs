@@ -118,6 +118,8 @@ fn what_the_lens_cannot_say_is_refused_by_its_name() {
     let kalibr = std::fs::read_to_string(file("kalibr.yaml")).unwrap();
     let ros = std::fs::read_to_string(file("ros.yaml")).unwrap();
     let opencv = std::fs::read_to_string(file("opencv.json")).unwrap();
+    let echo = std::fs::read_to_string(file("ros2_echo.yaml")).unwrap();
+    let halcon = std::fs::read_to_string(file("halcon_polynomial.dat")).unwrap();
     let second = kalibr.replace("cam0", "cam1");
     let stereo = "image_size: [640, 480]\nM1: [600, 0, 318, 0, 600, 242, 0, 0, 1]\nD1: [0, 0, 0, 0, 0]\n\
                   M2: [660, 0, 288, 0, 660, 252, 0, 0, 1]\nD2: [0, 0, 0, 0, 0]\n";
@@ -129,6 +131,8 @@ fn what_the_lens_cannot_say_is_refused_by_its_name() {
         (ros.replace("image_width: 640\n", ""), "size of the pictures"),
         (kalibr.clone() + &second, "2 cameras: cam0, cam1"),
         (stereo.to_owned(), "2 camera matrices: M1, M2"),
+        (echo.clone() + &echo, "begins a second document"),
+        (halcon.replace("Focus:foc", "Magnification:mag"), "a telecentric camera (Magnification 0.0051)"),
         (opencv.replace("\"flags\": 0", "\"xi\": 1.2"), "xi is 1.2"),
         (opencv.replace("\"flags\": 0", "\"lens_model\": \"fisheye\""), "lens_model is 'fisheye'"),
         (opencv.replace("\"flags\": 0", "\"is_fisheye\": true"), "is_fisheye is true"),

@@ -11,7 +11,9 @@ const FAITHFUL: f64 = 0.05;
 
 /// Whether a file holds HALCON's parameters.
 pub fn is_one(text: &str) -> bool {
-    text.contains("ParGroup:") && text.contains("Camera") && text.contains("Focus:")
+    text.contains("ParGroup:")
+        && text.contains("Camera")
+        && ["Focus:", "Magnification:"].iter().any(|k| text.contains(k))
 }
 
 /// Parameters by name: `Focus:foc: 0.008;`.
@@ -39,8 +41,12 @@ pub fn camera(text: &str) -> Result<(Intrinsics, String)> {
                 .next("write the parameters of an area-scan camera with a perspective lens")
         })
     };
-    if let Some(other) = ["Tilt", "Rot", "Magnification", "Vx", "ImagePlaneDist"].iter().find(|n| all.contains_key(**n))
-    {
+    if let Some(by) = all.get("Magnification") {
+        return Err(Fault::input(format!("a telecentric camera (Magnification {by}), which is not supported"))
+            .cause("its rays are parallel; the cameras here see from one point")
+            .next("use an area-scan camera with a perspective lens"));
+    }
+    if let Some(other) = ["Tilt", "Rot", "Vx", "ImagePlaneDist"].iter().find(|n| all.contains_key(**n)) {
         return Err(Fault::input(format!("has the parameter {other}"))
             .cause("camera parameters of another type: line scan, telecentric or tilted")
             .next("write the parameters of an area-scan camera with a perspective lens"));
