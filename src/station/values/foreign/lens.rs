@@ -69,10 +69,10 @@ fn without(file: &Map<String, Value>) -> Result<(Vec<f64>, String)> {
         .iter()
         .any(|key| file.get(*key).and_then(numbers).is_some_and(|terms| terms.is_empty()));
     // A driver whose pictures have no distortion publishes an empty D; the message always has its distortion_model.
-    if let Some(model) = file.get("distortion_model").map(|m| m.as_str().unwrap_or("")) {
-        if empty || model == "none" {
-            return Ok((vec![0.0; 5], format!("no lens terms, distortion_model is '{model}' and D is empty")));
-        }
+    if let Some(model) = file.get("distortion_model").map(|m| m.as_str().unwrap_or(""))
+        && (empty || model == "none")
+    {
+        return Ok((vec![0.0; 5], format!("no lens terms, distortion_model is '{model}' and D has none")));
     }
     let single = |key: &&String| TERMS.contains(&key.to_lowercase().as_str());
     let single: Vec<&str> = file.keys().filter(single).map(String::as_str).collect();
