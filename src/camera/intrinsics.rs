@@ -96,6 +96,29 @@ impl Intrinsics {
         self.undistort(&self.normalised(px))
     }
 
+    /// Where the lens model folds back inside the picture: the pixel nearest to the principal point on its way to one of
+    /// the corners and the middles of the sides. `None` if the lens can be inverted at all of these.
+    pub fn fold(&self) -> Option<Vec2> {
+        const ENDS: [[f64; 2]; 8] =
+            [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.5, 0.0], [0.5, 1.0], [0.0, 0.5], [1.0, 0.5]];
+        let axis = Vec2::new(self.cx, self.cy);
+        let seen = |px: &Vec2| self.normalised_from_pixel(px).is_some();
+        let edge = |end: Vec2| {
+            let (mut inside, mut beyond) = (axis, end);
+            // To a thousandth of a pixel of pictures up to 60000 pixels wide.
+            for _ in 0..26 {
+                let middle = (inside + beyond) / 2.0;
+                if seen(&middle) { inside = middle } else { beyond = middle }
+            }
+            inside
+        };
+        ENDS.into_iter()
+            .map(|[x, y]| Vec2::new(x * f64::from(self.width) - 0.5, y * f64::from(self.height) - 0.5))
+            .filter(|end| !seen(end))
+            .map(edge)
+            .min_by(|a, b| (a - axis).norm().total_cmp(&(b - axis).norm()))
+    }
+
     /// Viewing ray of a pixel, from the centre of projection.
     pub fn ray_from_pixel(&self, px: &Vec2) -> Option<Ray<CameraFrame>> {
         let n = self.normalised_from_pixel(px)?;

@@ -157,20 +157,25 @@ impl Measured for Axis {
     }
 }
 
+/// Depths at which a camera sees a plane, nearest and farthest of a grid over the picture, mm; `None` if no ray meets it
+/// in front of the camera.
+pub fn depths_seen(camera: &Intrinsics, plane: &Plane<Camera>) -> Option<[f64; 2]> {
+    let depths = (0..=16).flat_map(|i| (0..=16).map(move |j| (i, j))).filter_map(|(i, j)| {
+        let px =
+            Vec2::new(f64::from(i) / 16.0 * f64::from(camera.width), f64::from(j) / 16.0 * f64::from(camera.height));
+        camera.ray_from_pixel(&px)?.meet(plane).map(|p| p.z)
+    });
+    let seen = depths.fold([f64::INFINITY, 0.0f64], |[a, b], z| [a.min(z), b.max(z)]);
+    (seen[1] > 0.0).then_some(seen)
+}
+
 impl Rig {
     /// Refuses a laser plane that is nowhere visible to the camera in the working volume.
     pub fn reaches(&self, volume: Option<&Volume>) -> Result<()> {
         let depth_mm = Volume::depths(volume);
         let (Some(camera), Some(laser)) = (&self.camera, &self.laser_plane) else { return Ok(()) };
         let (camera, plane) = (&camera.value, &laser.value);
-        let depths = (0..=16).flat_map(|i| (0..=16).map(move |j| (i, j))).filter_map(|(i, j)| {
-            let px = Vec2::new(
-                f64::from(i) / 16.0 * f64::from(camera.width),
-                f64::from(j) / 16.0 * f64::from(camera.height),
-            );
-            camera.ray_from_pixel(&px)?.meet(plane).map(|p| p.z)
-        });
-        let seen = depths.fold([f64::INFINITY, 0.0f64], |[a, b], z| [a.min(z), b.max(z)]);
+        let seen = depths_seen(camera, plane).unwrap_or([f64::INFINITY, 0.0]);
         if seen[0] <= depth_mm[1] && seen[1] >= depth_mm[0] {
             return Ok(());
         }

@@ -21,6 +21,7 @@ pub use calibration::{
     AXIS_SIGMA_DEG, AXIS_SIGMA_MM, Calibration, HandEye, Quality, ROBOT_SIGMA_DEG, ROBOT_SIGMA_MM, Verdict, axis_sigma,
     hash_file,
 };
+pub use checks::depths_seen;
 pub use covariance::Covariance;
 pub use hash::hash_text;
 pub use joint::{Joint, JointCovariance};

@@ -3,6 +3,7 @@
 //! Frame and unit: camera frame, mm, degrees, px; each key shows its unit, docs/file-formats.md, Rig file.
 
 use super::sensor::Sensor;
+use crate::camera::{Distortion, Intrinsics};
 use crate::fault::{Fault, Result};
 use std::path::Path;
 
@@ -203,8 +204,24 @@ impl RigSpec {
             Some((name, v, low, high)) => Err(Fault::input(format!("{name} is {v}, allowed {low}..={high}"))
                 .cause("a slip in the rig file, or another unit than the key names")
                 .next("correct the value")),
-            None => Ok(()),
+            None => self.folds(),
         }
+    }
+
+    /// Refuses a lens that cannot be inverted over the picture.
+    fn folds(&self) -> Result<()> {
+        let c = &self.camera;
+        let mut distortion = Distortion::from(c.distortion);
+        [distortion.0[12], distortion.0[13]] = c.sensor_tilt_deg.map(f64::to_radians);
+        let middle = |n: u32| (f64::from(n) - 1.0) / 2.0;
+        let (f, cx, cy) = (self.focal_px(), middle(c.width_px), middle(c.height_px));
+        let camera = Intrinsics { fx: f, fy: f, cx, cy, skew: 0.0, distortion, width: c.width_px, height: c.height_px };
+        camera.fold().map_or(Ok(()), |at| {
+            let far = (at.x - cx).hypot(at.y - cy);
+            Err(Fault::input(format!("camera.distortion_k1_k2_p1_p2_k3 folds back {far:.0} px from the middle"))
+                .cause("a slip in the rig file: beyond that no point of the scene comes into the picture")
+                .next("correct the terms, or state a smaller picture"))
+        })
     }
 
     /// Focal length of the design, px.
@@ -283,6 +300,7 @@ mod tests {
             ("near_mm = 60", "near_mm = 160", "working.near_mm is 160"),
             ("bits = 8", "bits = 24", "bits is 24"),
             ("focal_mm = 5.07628", "focal_mm = nan", "camera.focal_mm is NaN"),
+            ("k3 = [-0.11, 0.08", "k3 = [-1.5, 0", "folds back 192 px"),
         ] {
             let text = PAPER.replacen(from, to, 1);
             assert_ne!(text, PAPER, "{from}");

@@ -83,5 +83,5 @@ pub use scan::seen::Seen;
 pub use scan::watch::Watch;
 pub use scan_profiles::{Moved, ProfileScan, scan_profiles};
 pub use settings::{HeadSpec, Settings, ToolSpec, WorkingVolume};
-pub use values::{PlaneValue, Sigmas, Values, ValuesFormat, written_camera};
+pub use values::{PlaneValue, Sigmas, Values, ValuesFormat, remarks_of_import, written_camera};
 pub use verify::{CalibrationCheck, VerifyReport, VerifyRun, verify};

@@ -1,7 +1,7 @@
 //! Cameras in the files of other programs: values and conventions are those that the programs state. The OpenCV files
 //! were written by OpenCV 5; the others are laid out as their programs write them.
 
-use crate::common::{sheetlight, sheetlight_fails};
+use crate::common::{program, sheetlight, sheetlight_fails};
 use sheetlight::camera::{Distortion, Intrinsics};
 use sheetlight::geometry::Vec3;
 use sheetlight::rig::Rig;
@@ -72,11 +72,54 @@ fn halcons_polynomial_is_turned_round_and_its_division_refused() {
     assert!(refused.what.contains("kappa is -2253.5") && !refused.next.is_empty(), "{refused}");
 }
 
+/// A camera without a lens measures wrongly, so a key that is not recognised must not become zeros.
+#[test]
+fn a_lens_is_read_under_any_spelling_or_the_file_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let load = |text: &str| {
+        let path = dir.path().join("c.txt");
+        std::fs::write(&path, text).unwrap();
+        Values::load(&path)
+    };
+    let five = truth(&[-0.21, 0.07, 3e-4, -7.25e-5, 0.01]);
+    let json = std::fs::read_to_string(file("opencv.json")).unwrap();
+    for key in ["dist_coeff", "dist_coefs", "distortion", "distortionCoefficients", "DistCoeffs", "distortion_params"] {
+        let values = load(&json.replace("distortion_coefficients", key)).unwrap();
+        assert_eq!(values.intrinsics, Some(five), "{key}");
+        let said = values.read_as.unwrap();
+        assert!(said.contains(&format!("5 lens terms k1 k2 p1 p2 k3 ... of '{key}'")), "{said}");
+    }
+    let ros = std::fs::read_to_string(file("ros2_echo.yaml")).unwrap();
+    let list = "d:\n- -0.21\n- 0.07\n- 0.0003\n- -7.25e-05\n- 0.01\n";
+    assert!(ros.contains(list));
+    let empty = load(&ros.replace(list, "d: []\n")).unwrap();
+    assert!(empty.intrinsics == Some(truth(&[0.0; 5])) && empty.read_as.unwrap().contains("no lens terms"));
+    let kalibr = std::fs::read_to_string(file("kalibr.yaml")).unwrap();
+    let matlab = std::fs::read_to_string(file("matlab.json")).unwrap();
+    let defaults = load(&matlab.replace("\"RadialDistortion", "\"Radial")).unwrap();
+    assert!(defaults.read_as.unwrap().contains("RadialDistortion is not there: zeros"));
+    let halcon = std::fs::read_to_string(file("halcon_polynomial.dat")).unwrap();
+    for (text, wanted) in [
+        (json.replace("distortion_coefficients", "cam_dist"), "does not state its lens"),
+        (ros.replace(list, ""), "does not state its lens"),
+        (json.replace("\"flags\": 0", "\"D\": [0, 0, 0, 0, 0]"), "two lenses that differ"),
+        (kalibr.replace("  distortion_model: radtan\n", ""), "has no distortion_model"),
+        (kalibr.replace("radtan", "none"), "distortion_model is 'none'"),
+        (halcon.replace("Poly1:poly1", "Other:other"), "has no Poly1"),
+    ] {
+        let fault = load(&text).err().unwrap_or_else(|| panic!("'{wanted}' was taken: {text}"));
+        assert!(fault.what.contains(wanted) && !fault.next.is_empty(), "'{wanted}' is not in: {fault}");
+    }
+}
+
 #[test]
 fn what_the_lens_cannot_say_is_refused_by_its_name() {
     let dir = tempfile::tempdir().unwrap();
     let kalibr = std::fs::read_to_string(file("kalibr.yaml")).unwrap();
     let ros = std::fs::read_to_string(file("ros.yaml")).unwrap();
+    let opencv = std::fs::read_to_string(file("opencv.json")).unwrap();
+    let echo = std::fs::read_to_string(file("ros2_echo.yaml")).unwrap();
+    let halcon = std::fs::read_to_string(file("halcon_polynomial.dat")).unwrap();
     let second = kalibr.replace("cam0", "cam1");
     let stereo = "image_size: [640, 480]\nM1: [600, 0, 318, 0, 600, 242, 0, 0, 1]\nD1: [0, 0, 0, 0, 0]\n\
                   M2: [660, 0, 288, 0, 660, 252, 0, 0, 1]\nD2: [0, 0, 0, 0, 0]\n";
@@ -88,6 +131,11 @@ fn what_the_lens_cannot_say_is_refused_by_its_name() {
         (ros.replace("image_width: 640\n", ""), "size of the pictures"),
         (kalibr.clone() + &second, "2 cameras: cam0, cam1"),
         (stereo.to_owned(), "2 camera matrices: M1, M2"),
+        (echo.clone() + &echo, "begins a second document"),
+        (halcon.replace("Focus:foc", "Magnification:mag"), "a telecentric camera (Magnification 0.0051)"),
+        (opencv.replace("\"flags\": 0", "\"xi\": 1.2"), "xi is 1.2"),
+        (opencv.replace("\"flags\": 0", "\"lens_model\": \"fisheye\""), "lens_model is 'fisheye'"),
+        (opencv.replace("\"flags\": 0", "\"is_fisheye\": true"), "is_fisheye is true"),
         ("{\"camera_matrix\": 1, \"image_size\": [640, 480], \"camera_matrix\": 2}".into(), "camera_matrix"),
         ("{\"units\": \"inch\", \"laser_plane_camera\": {}}".into(), "lengths are read in mm only"),
     ] {
@@ -116,6 +164,26 @@ fn a_matrix_of_pictures_of_another_size_is_asked_about() {
         assert!(said.contains("principal point") && said.contains("--as-stated"), "{size:?}: {said}");
         sheetlight(&[&import[..], &["--as-stated"]].concat());
     }
+}
+
+#[test]
+fn an_import_says_how_it_read_the_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let station = dir.path().join("st").to_str().unwrap().to_owned();
+    let from = file("ros2_echo.yaml");
+    let import = ["station", "import", from.to_str().unwrap(), "--station", &station];
+    let said = sheetlight(&[&["--json"], &import[..]].concat());
+    let result: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(result["stored"], serde_json::json!(["camera"]));
+    let remarks = result["remarks"].as_array().unwrap();
+    let has = |words: &str| remarks.iter().any(|r| r.as_str().unwrap().contains(words));
+    assert!(has("camera: read as ROS (camera_info) writes it") && has("binning 2 x 2"), "{said}");
+    assert!(has("assumed at the import"), "{said}");
+    // On the console the remarks are messages, not data.
+    let done = std::process::Command::new(program()).args(import).output().unwrap();
+    let talk = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success() && talk.contains("binning 2 x 2"), "{talk}");
+    assert!(!String::from_utf8_lossy(&done.stdout).contains("binning"));
 }
 
 #[test]

@@ -344,7 +344,7 @@ impl Evidence<'_> {
                 format!("pictures that were held out fit with {held:.3} px, those used with {:.3} px", solved.rms_px)
             });
         }
-        j.at_best(Verdict::BadlyDetermined, quality::folds(&solved.intrinsics), || {
+        j.at_best(Verdict::BadlyDetermined, solved.intrinsics.fold().is_some(), || {
             "the lens model folds back inside the image: take boards nearer to its corners, or ask for fewer terms (--lens \
              four)"
                 .into()

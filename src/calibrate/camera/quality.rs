@@ -180,15 +180,6 @@ fn picture_information(
     (inside >= 8).then(|| pp.try_inverse().map(|inv| kk - kp * inv * kp.transpose())).flatten()
 }
 
-/// True if the lens model folds back inside the image, where it cannot be inverted.
-pub fn folds(k: &Intrinsics) -> bool {
-    let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (0.5, 0.0), (0.5, 1.0), (0.0, 0.5), (1.0, 0.5)];
-    corners.iter().any(|(x, y)| {
-        let px = Vec2::new(x * f64::from(k.width) - 0.5, y * f64::from(k.height) - 0.5);
-        k.normalised_from_pixel(&px).is_none()
-    })
-}
-
 /// Mean displacement of each feature on the board over all pictures and its standard error, mm. If the board differs
 /// from its description (warped, badly printed), a feature is displaced the same way in every picture. Entries:
 /// feature id, mean, error, pictures; features in fewer than 3 pictures are excluded.

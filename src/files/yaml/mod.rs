@@ -25,6 +25,9 @@ pub fn parse(text: &str) -> Result<Value> {
         let value = match event {
             Event::Scalar(text, ScalarStyle::Plain, ..) => scalar(&text),
             Event::Scalar(text, ..) => Value::String(text.into_owned()),
+            Event::SequenceStart(..) | Event::MappingStart(..) if open.is_empty() && whole.is_some() => {
+                return Err(second(line));
+            }
             Event::SequenceStart(..) | Event::MappingStart(..) if open.len() == DEEPEST => {
                 return Err(unread(line, &format!("more than {DEEPEST} lists and maps in each other")));
             }
@@ -59,10 +62,16 @@ pub fn parse(text: &str) -> Result<Value> {
             None if whole.is_none() => whole = Some(value),
             // `ros2 topic echo` ends each message with '---'.
             None if value.is_null() => {}
-            None => return Err(unread(line, "a second document")),
+            None => return Err(second(line)),
         }
     }
     Ok(whole.unwrap_or(Value::Null))
+}
+
+fn second(line: usize) -> Fault {
+    Fault::input(format!("line {line} begins a second document"))
+        .cause("more than one message of ros2 topic echo, or files that were joined")
+        .next("leave one of them in the file; with ROS: ros2 topic echo --once")
 }
 
 fn unread(line: usize, what: &str) -> Fault {
@@ -108,7 +117,8 @@ mod tests {
             ("a: 1\n  b: 2", "line 2"),
             ("a: &x [1]\nb: [*x, *x]", "an alias"),
             ("a: 1\na: 2", "'a' for the second time"),
-            ("a: 1\n---\nb: 2\n", "a second document"),
+            ("a: 1\n---\nb: 2\nc: 3\n", "begins a second document"),
+            ("a: 1\n---\n7\n", "a second document"),
             (&deep, "more than 30"),
         ] {
             let said = parse(bad).unwrap_err().what;

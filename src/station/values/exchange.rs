@@ -3,6 +3,7 @@
 //! Frame and unit: keys as in the reference data's format: `flange_T_camera`, mm, row-major.
 
 use super::assumed::{Assumed, Sigmas};
+use super::sound;
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Axis, AxisKind, Base, Camera, ORTHONORMAL_WARN, Plane, Ray, Rigid, Vec3};
@@ -161,6 +162,11 @@ impl Values {
         if !as_stated {
             self.intrinsics.as_ref().map_or(Ok(()), of_its_pictures).map_err(|e| e.at(source.display()))?;
         }
+        let at_source = |e: Fault| e.at(source.display());
+        self.intrinsics.as_ref().map_or(Ok(()), sound::lens).map_err(at_source)?;
+        if let (Some(camera), Some(plane)) = (with, &laser_plane) {
+            sound::plane(&camera.value, &plane.value).map_err(at_source)?;
+        }
         let rig = Rig { camera, laser_plane, pointer, hand_eye, base_camera, linear_axis, turntable, ..Rig::default() };
         if !as_stated {
             rig.records().into_iter().try_for_each(Record::likely)?;
@@ -178,6 +184,20 @@ impl Values {
         }
         Ok(stored)
     }
+}
+
+/// The reason that every imported record states for its verdict.
+const AS_ITS_SOURCE: &str = "imported: the values are as good as their source";
+
+/// What the records of these kinds state about their import: the program that wrote the file, what was assumed of it or
+/// repaired, and the remarks of the rig's reports.
+pub fn remarks_of_import(rig: &Rig, kinds: &[Kind]) -> Vec<String> {
+    let of = |r: &dyn Record| -> Vec<String> {
+        let reasons = r.quality().reasons.iter().filter(|said| *said != AS_ITS_SOURCE);
+        reasons.map(|said| format!("{}: {said}", r.kind().words())).collect()
+    };
+    let stored = rig.records().into_iter().filter(|r| kinds.contains(&r.kind()));
+    stored.flat_map(of).chain(rig.remarks()).collect()
 }
 
 fn no_length(key: &str) -> Fault {
@@ -229,10 +249,9 @@ fn imported<T: serde::Serialize>(
     note: Option<String>,
     source: &Path,
 ) -> Result<Calibration<T>> {
-    let source_says = "imported: the values are as good as their source".to_owned();
     let quality = Quality {
         verdict: Verdict::Usable,
-        reasons: std::iter::once(source_says).chain(note).collect(),
+        reasons: std::iter::once(AS_ITS_SOURCE.to_owned()).chain(note).collect(),
         advice: vec![],
         figures: Default::default(),
         per_picture: vec![],

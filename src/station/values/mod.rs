@@ -3,8 +3,9 @@
 mod assumed;
 mod exchange;
 mod foreign;
+mod sound;
 mod stated;
 
 pub use assumed::Sigmas;
-pub use exchange::{PlaneValue, Values};
+pub use exchange::{PlaneValue, Values, remarks_of_import};
 pub use foreign::{Format as ValuesFormat, written as written_camera};

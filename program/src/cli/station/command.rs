@@ -12,7 +12,7 @@ use sheetlight::fault::{Fault, Result};
 use sheetlight::geometry::{Axis, AxisKind, Frame, Rigid};
 use sheetlight::rig::{Calibration, Kind, Rig};
 use sheetlight::robot::Convention;
-use sheetlight::station::{Settings, Sigmas, Values, ValuesFormat, written_camera};
+use sheetlight::station::{Settings, Sigmas, Values, ValuesFormat, remarks_of_import, written_camera};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
@@ -99,6 +99,14 @@ pub struct Import {
     camera_sigma_px: Option<f64>,
 }
 
+/// The result of an import.
+#[derive(serde::Serialize)]
+struct Stored {
+    stored: Vec<Kind>,
+    /// How the file was read, and what was assumed.
+    remarks: Vec<String>,
+}
+
 impl Import {
     fn sigmas(&self) -> Sigmas {
         Sigmas {
@@ -160,9 +168,15 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
             if !a.station.join("station.toml").exists() {
                 Settings { name: named(&a.station), ..Settings::default() }.store(&a.station)?;
             }
+            let rig = Rig::load(&a.station);
+            let remarks = rig.as_ref().map_or_else(|_| Vec::new(), |rig| remarks_of_import(rig, &stored));
             let names: Vec<String> = stored.iter().map(|k| k.words()).collect();
-            console.result(&stored, &format!("{}: imported {}", a.station.display(), names.join(", ")));
-            Rig::load(&a.station)?.remarks().into_iter().for_each(|remark| console.say(remark));
+            let text = format!("{}: imported {}", a.station.display(), names.join(", "));
+            let result = Stored { stored, remarks };
+            console.result(&result, &text);
+            // Another record of the station may be spoilt; the values are stored even so.
+            rig?;
+            result.remarks.iter().for_each(|remark| console.say(remark));
             stale(&a.station, console);
         }
         Command::Export(a) => {

@@ -6,7 +6,6 @@ use super::families::{Doubt, squares, without};
 use crate::calibrate::camera::bundle::State;
 use crate::calibrate::camera::fit::Fit;
 use crate::calibrate::camera::lens::Lens;
-use crate::calibrate::camera::quality::folds;
 use crate::calibrate::camera::ray_error::expected_ray_error;
 use crate::camera::{LENS, SKEW};
 use crate::solve::Solution;
@@ -50,10 +49,7 @@ pub(in crate::calibrate::camera) fn by_folding(
     solution: &mut Solution<State>,
     held: &mut Vec<usize>,
 ) -> Option<Doubt> {
-    let folded = fit.camera(solution);
-    if !folds(&folded) {
-        return None;
-    }
+    fit.camera(solution).fold()?;
     for lens in [Lens::Five, Lens::Four, Lens::One] {
         let fewer: Vec<usize> = lens.held().into_iter().chain(held.contains(&SKEW).then_some(SKEW)).collect();
         if fewer.len() <= held.len() {
@@ -64,7 +60,7 @@ pub(in crate::calibrate::camera) fn by_folding(
         let Some(plain) = fit.fine(&fewer, start).so_far() else { continue };
         let explained_px = (squares(fit, &plain) - squares(fit, solution)).max(0.0).sqrt();
         let nearly = explained_px < FOLDED_PX.max(NEARLY * squares(fit, solution).sqrt());
-        if !folds(&fit.camera(&plain)) && nearly {
+        if fit.camera(&plain).fold().is_none() && nearly {
             let doubt = Doubt::of(fit, (&plain, solution), Lens::Five, explained_px);
             (*solution, *held) = (plain, fewer);
             return Some(doubt);

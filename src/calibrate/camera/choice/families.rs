@@ -6,7 +6,6 @@ use super::held_out::{WORTH, gain, held_out};
 use crate::calibrate::camera::bundle::State;
 use crate::calibrate::camera::fit::Fit;
 use crate::calibrate::camera::lens::Lens;
-use crate::calibrate::camera::quality::folds;
 use crate::calibrate::camera::ray_error::{expected_ray_error, expected_ray_error_at, following, rays_apart};
 use crate::camera::{Intrinsics, ParameterMatrix, Parameters, SKEW};
 use crate::solve::Solution;
@@ -53,7 +52,7 @@ impl Doubt {
     ) -> Doubt {
         let [plain, more] = [plain, more].map(|s| fit.camera(s));
         let moved = more.parameters() - plain.parameters();
-        let folds = folds(&more);
+        let folds = more.fold().is_some();
         Doubt { lens, explained_px, rays_px: rays_apart(&plain, &more), moved, folds }
     }
 

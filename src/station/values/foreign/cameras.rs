@@ -1,7 +1,8 @@
 //! A camera from the keys of another program's calibration: OpenCV, ROS camera_info, Kalibr, MATLAB. A lens model
 //! that this program cannot represent is refused by name.
 
-use super::{halcon, tree};
+use super::keys::{any, exactly, missing, numbers};
+use super::{halcon, lens, projection, tree};
 use crate::camera::{Distortion, Intrinsics};
 use crate::fault::{Fault, Result};
 use serde_json::Value;
@@ -9,18 +10,6 @@ use serde_json::Value;
 /// Key names that programs use for the same content.
 const MATRIX: [&str; 8] =
     ["camera_matrix", "Camera_Matrix", "cameraMatrix", "CameraMatrix", "intrinsic_matrix", "K", "M1", "k"];
-const LENS: [&str; 10] = [
-    "distortion_coefficients",
-    "Distortion_Coefficients",
-    "distortion_coeffs",
-    "dist_coeffs",
-    "distCoeffs",
-    "distCoeff",
-    "dist",
-    "D",
-    "D1",
-    "d",
-];
 const WIDTH: [&str; 3] = ["image_width", "image_Width", "width"];
 const HEIGHT: [&str; 3] = ["image_height", "image_Height", "height"];
 const SIZE: [&str; 3] = ["image_size", "imageSize", "resolution"];
@@ -38,28 +27,36 @@ pub fn camera(text: &str) -> Result<Option<(Intrinsics, String)>> {
         Err(fault) => return Err(fault),
     };
     let Value::Object(map) = &file else { return Ok(None) };
-    if map.contains_key("FocalLength") || map.contains_key("IntrinsicMatrix") {
-        return matlab(&file).map(Some);
-    }
+    let matlabs = ["FocalLength", "IntrinsicMatrix", "MappingCoefficients"];
+    let (read, one): (fn(&Value) -> Result<(Intrinsics, String)>, &Value) =
+        if matlabs.iter().any(|key| map.contains_key(*key)) {
+            (matlab, &file)
+        } else if let Some(cam) = of_kalibr(&file, map)? {
+            (kalibr, cam)
+        } else {
+            single(map)?;
+            if any(&file, &MATRIX).is_none() || map.contains_key("intrinsics") {
+                return Ok(None);
+            }
+            (opencv, &file)
+        };
+    projection::check(map)?;
+    read(one).map(Some)
+}
+
+/// The camera of Kalibr's chain, or that of a file with Kalibr's keys.
+fn of_kalibr<'a>(file: &'a Value, map: &'a serde_json::Map<String, Value>) -> Result<Option<&'a Value>> {
     let chain: Vec<(&String, &Value)> = map.iter().filter(|(_, v)| v.get("camera_model").is_some()).collect();
     match chain[..] {
-        [] => {}
-        [(_, only)] => return kalibr(only).map(Some),
+        [] => Ok(map.contains_key("camera_model").then_some(file)),
+        [(_, only)] => Ok(Some(only)),
         _ => {
             let names: Vec<&str> = chain.iter().map(|(k, _)| k.as_str()).collect();
-            return Err(Fault::input(format!("holds {} cameras: {}", chain.len(), names.join(", ")))
+            Err(Fault::input(format!("holds {} cameras: {}", chain.len(), names.join(", ")))
                 .cause("Kalibr's chain of several cameras; a station has one")
-                .next("leave one of them in the file"));
+                .next("leave one of them in the file"))
         }
     }
-    if file.get("camera_model").is_some() {
-        return kalibr(&file).map(Some);
-    }
-    single(map)?;
-    if any(&file, &MATRIX).is_none() || file.get("intrinsics").is_some() {
-        return Ok(None);
-    }
-    opencv(&file).map(Some)
 }
 
 /// Refuses a file with the matrices of two cameras: M1 and M2, `camera_matrix_left` and `camera_matrix_right`.
@@ -81,37 +78,6 @@ fn single(map: &serde_json::Map<String, Value>) -> Result<()> {
 fn pinhole(v: &Value) -> bool {
     matches!(numbers(v).as_deref(), Some(&[fx, _, cx, 0.0, fy, cy, 0.0, 0.0, 1.0])
         if fx > 1.0 && fy > 1.0 && cx > 1.0 && cy > 1.0)
-}
-
-fn any<'a>(v: &'a Value, names: &[&str]) -> Option<&'a Value> {
-    names.iter().find_map(|n| v.get(*n)).filter(|v| !v.is_null())
-}
-
-fn missing(what: &str, names: &[&str]) -> Fault {
-    Fault::input(format!("has no {what}, looked for as {}", names.join(", ")))
-        .cause("another program's file, or keys of another spelling")
-        .next("add it, or rename the key")
-}
-
-/// All numbers of a list, a list of lists, or a matrix with `data`, row by row.
-fn numbers(v: &Value) -> Option<Vec<f64>> {
-    match v {
-        Value::Number(n) => n.as_f64().map(|n| vec![n]),
-        Value::Array(items) => items.iter().map(numbers).collect::<Option<Vec<_>>>().map(|all| all.concat()),
-        Value::Object(m) => m.get("data").and_then(numbers),
-        _ => None,
-    }
-}
-
-/// The numbers of a value; refuses a count that is not in `counts`.
-fn exactly(v: &Value, what: &str, counts: &[usize]) -> Result<Vec<f64>> {
-    numbers(v).filter(|n| counts.contains(&n.len())).ok_or_else(|| {
-        let found = numbers(v).map_or("something else".into(), |n| format!("{} numbers", n.len()));
-        let wanted: Vec<String> = counts.iter().map(usize::to_string).collect();
-        Fault::input(format!("{what}: {found}, {} are wanted", wanted.join(" or ")))
-            .cause("another lens model, or a damaged file")
-            .next("write the calibration again")
-    })
 }
 
 fn size(file: &Value) -> Result<[u32; 2]> {
@@ -145,26 +111,18 @@ fn from_matrix(k: &[f64], distortion: Distortion, [width, height]: [u32; 2]) -> 
 fn opencv(file: &Value) -> Result<(Intrinsics, String)> {
     let matrix = any(file, &MATRIX).ok_or_else(|| missing("camera matrix", &MATRIX))?;
     let matrix = exactly(matrix, "the camera matrix", &[9])?;
+    let map = file.as_object().expect("it has a key");
     let model = file.get("distortion_model").and_then(Value::as_str).unwrap_or("");
-    let fisheye = file.get("fisheye_model").and_then(Value::as_f64).is_some_and(|x| x != 0.0);
-    if !matches!(model, "" | "plumb_bob" | "rational_polynomial" | "thin_prism" | "none") || fisheye {
-        return Err(another_lens(if fisheye { "fisheye" } else { model }));
+    if !matches!(model, "" | "plumb_bob" | "rational_polynomial" | "thin_prism" | "none") {
+        return Err(projection::another("distortion_model", &model.into()));
     }
-    let terms = match any(file, &LENS) {
-        Some(v) => {
-            numbers(v).filter(|n| n.is_empty()).map_or_else(|| exactly(v, "the lens", &[4, 5, 8, 12, 14]), Ok)?
-        }
-        None => Vec::new(),
-    };
-    let terms = if terms.is_empty() { vec![0.0; 5] } else { terms };
-    let distortion = Distortion::from_opencv(&terms).expect("counted above");
-    let by = if model.is_empty() { "OpenCV" } else { "ROS (camera_info)" };
-    let said = format!(
-        "read as {by} writes it: {} lens terms k1 k2 p1 p2 k3 ..., (0, 0) is the centre of a pixel",
-        terms.len()
-    ) + &driver(file).map_or(String::new(), |d| {
-        format!("; its {d} belongs to the driver, not to the matrix: state it as 'readout' in meta.json")
-    });
+    let (terms, lens) = lens::terms(map)?;
+    let distortion = Distortion::from_opencv(&terms).expect("counted there");
+    let by = if model.is_empty() && !map.contains_key("distortion_model") { "OpenCV" } else { "ROS (camera_info)" };
+    let said = format!("read as {by} writes it: {lens}, (0, 0) is the centre of a pixel")
+        + &driver(file).map_or(String::new(), |d| {
+            format!("; its {d} belongs to the driver, not to the matrix: state it as 'readout' in meta.json")
+        });
     Ok((from_matrix(&matrix, distortion, size(file)?)?, said))
 }
 
@@ -185,35 +143,34 @@ fn driver(file: &Value) -> Option<String> {
     (!said.is_empty()).then(|| said.join(", "))
 }
 
-fn another_lens(model: &str) -> Fault {
-    Fault::input(format!(
-        "the lens model is '{model}', only Brown-Conrady's and OpenCV's extensions of it are known \
-         here"
-    ))
-    .cause("calibrated as a fisheye or with another program's model, whose terms mean something else")
-    .next(
-        "calibrate with the model of radial and tangential terms (plumb_bob, radtan), or here: sheetlight \
-             calibrate camera",
-    )
-}
-
 fn kalibr(cam: &Value) -> Result<(Intrinsics, String)> {
-    let word = |key: &str| cam.get(key).and_then(Value::as_str).unwrap_or("none").to_owned();
-    let (model, lens) = (word("camera_model"), word("distortion_model"));
-    if model != "pinhole" {
-        return Err(another_lens(&model));
-    }
     let of = |key: &str| cam.get(key).ok_or_else(|| missing(key, &[key]));
+    let (model, lens) = (of("camera_model")?, of("distortion_model")?);
+    if model != "pinhole" {
+        return Err(projection::another("camera_model", model));
+    }
     let k = exactly(of("intrinsics")?, "intrinsics", &[4])?;
-    let terms = match lens.as_str() {
-        "radtan" => exactly(of("distortion_coeffs")?, "distortion_coeffs", &[4])?,
-        "none" => vec![0.0; 4],
-        other => return Err(another_lens(other)),
+    let (terms, said) = match lens.as_str() {
+        Some("radtan") => (exactly(of("distortion_coeffs")?, "distortion_coeffs", &[4])?, "radtan k1 k2 p1 p2"),
+        Some("none") => (unused(cam)?, "no lens terms, distortion_model is 'none'"),
+        _ => return Err(projection::another("distortion_model", lens)),
     };
     let [width, height] = size(cam)?;
     let distortion = Distortion::from_opencv(&terms).expect("four terms");
     let camera = Intrinsics { fx: k[0], fy: k[1], cx: k[2], cy: k[3], skew: 0.0, distortion, width, height };
-    Ok((camera, "read as Kalibr writes it: fu fv pu pv, radtan k1 k2 p1 p2, (0, 0) is the centre of a pixel".into()))
+    Ok((camera, format!("read as Kalibr writes it: fu fv pu pv, {said}, (0, 0) is the centre of a pixel")))
+}
+
+/// The terms of a lens without a model, all zero.
+fn unused(cam: &Value) -> Result<Vec<f64>> {
+    match cam.get("distortion_coeffs").and_then(numbers) {
+        Some(terms) if terms.iter().any(|t| *t != 0.0) => {
+            Err(Fault::input(format!("distortion_model is 'none', distortion_coeffs is {terms:?}"))
+                .cause("an edited file")
+                .next("name the model of these terms, or remove them"))
+        }
+        _ => Ok(vec![0.0; 4]),
+    }
 }
 
 /// MATLAB's cameraParameters and cameraIntrinsics as `jsonencode(toStruct(p))` writes them: its first pixel is (1, 1),
@@ -225,8 +182,15 @@ fn matlab(file: &Value) -> Result<(Intrinsics, String)> {
         (_, _, Some(k)) => (vec![k[0], k[4]], vec![k[6], k[7]], k[3]),
         _ => return Err(missing("camera", &["FocalLength and PrincipalPoint", "IntrinsicMatrix"])),
     };
-    let radial = of("RadialDistortion", &[2, 3])?.unwrap_or_else(|| vec![0.0; 2]);
-    let tangential = of("TangentialDistortion", &[2])?.unwrap_or_else(|| vec![0.0; 2]);
+    let (radial, tangential) = (of("RadialDistortion", &[2, 3])?, of("TangentialDistortion", &[2])?);
+    // MATLAB's documented defaults.
+    let lens = match (&radial, &tangential) {
+        (None, None) => "; RadialDistortion and TangentialDistortion are not there: zeros, MATLAB's defaults",
+        (None, _) => "; RadialDistortion is not there: zeros, MATLAB's default",
+        (_, None) => "; TangentialDistortion is not there: zeros, MATLAB's default",
+        _ => "",
+    };
+    let [radial, tangential] = [radial, tangential].map(|terms| terms.unwrap_or_else(|| vec![0.0; 2]));
     let [rows, columns]: [f64; 2] = of("ImageSize", &[2])?
         .ok_or_else(|| missing("size of the pictures", &["ImageSize"]))?
         .try_into()
@@ -243,9 +207,6 @@ fn matlab(file: &Value) -> Result<(Intrinsics, String)> {
         width,
         height,
     };
-    Ok((
-        camera,
-        "read as MATLAB writes it: its first pixel's centre is (1, 1), so 1 px was taken off the principal point"
-            .into(),
-    ))
+    let origin = "its first pixel's centre is (1, 1), so 1 px was taken off the principal point";
+    Ok((camera, format!("read as MATLAB writes it: {origin}{lens}")))
 }

@@ -11,7 +11,9 @@ const FAITHFUL: f64 = 0.05;
 
 /// Whether a file holds HALCON's parameters.
 pub fn is_one(text: &str) -> bool {
-    text.contains("ParGroup:") && text.contains("Camera") && text.contains("Focus:")
+    text.contains("ParGroup:")
+        && text.contains("Camera")
+        && ["Focus:", "Magnification:"].iter().any(|k| text.contains(k))
 }
 
 /// Parameters by name: `Focus:foc: 0.008;`.
@@ -39,8 +41,12 @@ pub fn camera(text: &str) -> Result<(Intrinsics, String)> {
                 .next("write the parameters of an area-scan camera with a perspective lens")
         })
     };
-    if let Some(other) = ["Tilt", "Rot", "Magnification", "Vx", "ImagePlaneDist"].iter().find(|n| all.contains_key(**n))
-    {
+    if let Some(by) = all.get("Magnification") {
+        return Err(Fault::input(format!("a telecentric camera (Magnification {by}), which is not supported"))
+            .cause("its rays are parallel; the cameras here see from one point")
+            .next("use an area-scan camera with a perspective lens"));
+    }
+    if let Some(other) = ["Tilt", "Rot", "Vx", "ImagePlaneDist"].iter().find(|n| all.contains_key(**n)) {
         return Err(Fault::input(format!("has the parameter {other}"))
             .cause("camera parameters of another type: line scan, telecentric or tilted")
             .next("write the parameters of an area-scan camera with a perspective lens"));
@@ -62,8 +68,12 @@ pub fn camera(text: &str) -> Result<(Intrinsics, String)> {
             .cause("a telecentric lens, whose focus HALCON writes as 0, or a damaged file")
             .next("write the parameters of an area-scan camera with a perspective lens"));
     }
-    let terms = [["Poly1", "K1"], ["Poly2", "K2"], ["Poly3", "K3"], ["Poly4", "P1"], ["Poly5", "P2"]]
-        .map(|names| of(&names).unwrap_or(0.0));
+    const POLYNOMIAL: [[&str; 2]; 5] =
+        [["Poly1", "K1"], ["Poly2", "K2"], ["Poly3", "K3"], ["Poly4", "P1"], ["Poly5", "P2"]];
+    let [k1, k2, k3, p1, p2] = POLYNOMIAL;
+    // A file of the division model has kappa only; kappa = 0 states a lens without distortion.
+    let divides = all.contains_key("Kappa") && POLYNOMIAL.iter().all(|names| of(names).is_none());
+    let terms = if divides { [0.0; 5] } else { [need(&k1)?, need(&k2)?, need(&k3)?, need(&p1)?, need(&p2)?] };
     let plain = Intrinsics {
         fx: focus / sx,
         fy: focus / sy,

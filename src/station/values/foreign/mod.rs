@@ -2,6 +2,9 @@
 
 mod cameras;
 mod halcon;
+mod keys;
+mod lens;
+mod projection;
 mod tree;
 mod write;
 
