@@ -96,8 +96,8 @@ impl Intrinsics {
         self.undistort(&self.normalised(px))
     }
 
-    /// Where the lens model folds back inside the picture: the pixel nearest to the principal point on its way to one of
-    /// the corners and the middles of the sides. `None` if the lens can be inverted at all of these.
+    /// Where the lens model folds back inside the picture: the pixel nearest to the principal point on its way to one
+    /// of the corners and the middles of the sides. `None` if the lens can be inverted at all of these.
     pub fn fold(&self) -> Option<Vec2> {
         const ENDS: [[f64; 2]; 8] =
             [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.5, 0.0], [0.5, 1.0], [0.0, 0.5], [1.0, 0.5]];

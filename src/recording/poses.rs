@@ -104,6 +104,7 @@ pub fn load_poses(path: &Path) -> Result<PoseFile> {
 
 fn collect(rows: Vec<Row>) -> Result<PoseFile> {
     let mut out = PoseFile { poses: Vec::new(), written: Vec::new(), warnings: Vec::new() };
+    let mut repaired: Vec<(usize, f64)> = Vec::new();
     for (expected, (index, convention, numbers)) in rows.into_iter().enumerate() {
         if index != expected {
             return Err(Fault::input(format!("pose {expected} is numbered {index}"))
@@ -117,10 +118,7 @@ fn collect(rows: Vec<Row>) -> Result<PoseFile> {
             _ => 0.0,
         };
         if departure > ORTHONORMAL_WARN {
-            out.warnings.push(format!(
-                "pose {index}: rotation repaired, it was {departure:.1e} from orthonormal \
-                                       (limit {ORTHONORMAL_WARN:.0e})"
-            ));
+            repaired.push((index, departure));
         }
         let pose = convention.read(&numbers).map_err(|e| e.at(format!("pose {index}")))?;
         let far = pose.translation.norm();
@@ -133,6 +131,13 @@ fn collect(rows: Vec<Row>) -> Result<PoseFile> {
         }
         out.poses.push(pose);
         out.written.push(Written { convention, numbers: without_figure(convention, numbers) });
+    }
+    if let Some((index, departure)) = repaired.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
+        let of = if let [_] = repaired[..] { String::new() } else { format!(" as the worst of {}", repaired.len()) };
+        out.warnings.push(format!(
+            "pose {index}{of}: rotation repaired, it was {departure:.1e} from orthonormal (limit \
+             {ORTHONORMAL_WARN:.0e})"
+        ));
     }
     let metres = out.metres();
     out.warnings.extend(metres);

@@ -157,8 +157,8 @@ impl Measured for Axis {
     }
 }
 
-/// Depths at which a camera sees a plane, nearest and farthest of a grid over the picture, mm; `None` if no ray meets it
-/// in front of the camera.
+/// Depths at which a camera sees a plane, nearest and farthest of a grid over the picture, mm; `None` if no ray meets
+/// it in front of the camera.
 pub fn depths_seen(camera: &Intrinsics, plane: &Plane<Camera>) -> Option<[f64; 2]> {
     let depths = (0..=16).flat_map(|i| (0..=16).map(move |j| (i, j))).filter_map(|(i, j)| {
         let px =

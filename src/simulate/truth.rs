@@ -185,7 +185,8 @@ impl CloudErrors {
             return CloudErrors::default();
         }
         d.sort_unstable_by(f64::total_cmp);
-        let rms = |d: &[f64]| (d.iter().map(|x| x * x).sum::<f64>() / d.len().max(1) as f64).sqrt();
+        // The sum of nothing is -0.
+        let rms = |d: &[f64]| (d.iter().fold(0.0, |sum, x| sum + x * x) / d.len().max(1) as f64).sqrt();
         let near = d.partition_point(|x| *x <= 1.0);
         let at = |q: f64| d[((d.len() - 1) as f64 * q).round() as usize];
         CloudErrors {

@@ -17,6 +17,7 @@ pub mod shape;
 mod view;
 
 pub use chess::turns::{Turn, turns};
+pub(crate) use other_size::WRONG_SIZE;
 pub use other_size::look_at_all;
 pub use search::find;
 pub use view::{BoardPoint, BoardView, FindOptions};

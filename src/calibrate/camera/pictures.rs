@@ -3,7 +3,7 @@
 //! Frame and unit: px.
 
 use super::intrinsics::Observation;
-use crate::calibrate::boards::{FindOptions, find, look_at_all};
+use crate::calibrate::boards::{FindOptions, WRONG_SIZE, find, look_at_all};
 use crate::fault::{Fault, Kind, Result};
 use crate::recording::{BoardSpec, FrameRef, Recording};
 use rayon::prelude::*;
@@ -154,7 +154,11 @@ fn no_board() -> Fault {
 fn too_few(found: usize, all: usize, left_out: &[(String, Fault)]) -> Fault {
     // The most frequent reason among the pictures; the first one of equally frequent reasons.
     let votes = |l: &(String, Fault)| left_out.iter().filter(|o| o.1.cause == l.1.cause).count();
-    let first = left_out.iter().rev().max_by_key(|l| votes(l)).map(|l| l.1.clone());
+    let most = left_out.iter().rev().max_by_key(|l| votes(l));
+    let unsearched = all - found - left_out.len();
+    // The search ended because some agree about another size; others of these may blame the picture's edge.
+    let sized = left_out.iter().find(|l| unsearched > 0 && l.1.cause == WRONG_SIZE);
+    let first = sized.or(most).map(|l| l.1.clone());
     let alike = |a: &Fault, b: &Fault| a.cause == b.cause && a.next == b.next;
     let listed: String = (0..left_out.len())
         .filter(|i| !left_out[..*i].iter().any(|l| alike(&l.1, &left_out[*i].1)))
@@ -170,7 +174,7 @@ fn too_few(found: usize, all: usize, left_out: &[(String, Fault)]) -> Fault {
             format!("\n    {name}{more}: {}", fault.what)
         })
         .collect();
-    let not_searched = match all - found - left_out.len() {
+    let not_searched = match unsearched {
         0 => String::new(),
         n => format!("; {} agree about another board, and the other {n} were not searched", left_out.len()),
     };

@@ -345,9 +345,8 @@ impl Evidence<'_> {
             });
         }
         j.at_best(Verdict::BadlyDetermined, solved.intrinsics.fold().is_some(), || {
-            "the lens model folds back inside the image: take boards nearer to its corners, or ask for fewer terms (--lens \
-             four)"
-                .into()
+            let what = "the lens model folds back inside the image";
+            format!("{what}: take boards nearer to its corners, or ask for fewer terms (--lens four)")
         });
         j.at_best(Verdict::Usable, self.covered < 0.6, || {
             format!(
@@ -441,8 +440,8 @@ fn doubted(doubt: &Doubt) -> String {
     let why =
         if doubt.folds { "the lens would fold back inside the image" } else { "no more than print, blur and light" };
     format!(
-        "the {name} terms are not estimated: they explain {:.3} px, {why}; they would move the viewing rays by {:.2} px, \
-         and half of that is in the uncertainty",
+        "the {name} terms are not estimated: they explain {:.3} px, {why}; they would move the viewing rays by \
+         {:.2} px, and half of that is in the uncertainty",
         doubt.explained_px, doubt.rays_px
     )
 }

@@ -63,8 +63,8 @@ fn decoded(picture: image::ImageResult<DynamicImage>, bytes: &[u8]) -> Result<(u
     Ok((channels, kind, values))
 }
 
-/// Number of channels, 1 or 3, and the levels of a JPEG; one that ends too early or is damaged is refused. Decoders made
-/// for viewers fill the missing part with grey, whose border a scan would take for a stripe.
+/// Number of channels, 1 or 3, and the levels of a JPEG; one that ends too early or is damaged is refused. Decoders
+/// made for viewers fill the missing part with grey, whose border a scan would take for a stripe.
 fn of_jpeg(bytes: &[u8]) -> Result<(usize, Kind, Values)> {
     if !is_whole(bytes) {
         return Err(damaged("the file ends before its picture does"));

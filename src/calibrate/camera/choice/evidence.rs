@@ -40,6 +40,8 @@ pub(in crate::calibrate::camera) fn by_evidence(fit: &Fit<'_>, solution: &mut So
 /// residuals, for fewer terms to replace it. In photographs of two cameras whose boards left the corners of the image
 /// free, k3 explained 0.006 and 0.010 px.
 const FOLDED_PX: f64 = 0.1;
+/// Of fewer pictures each set folds another lens, and what is left scatters less than it states.
+const MIN_PICTURES: usize = 8;
 const NEARLY: f64 = 0.5;
 
 /// Replaces a lens that folds back inside the image, which no lens does, by the one of most terms that does not. What
@@ -49,6 +51,11 @@ pub(in crate::calibrate::camera) fn by_folding(
     solution: &mut Solution<State>,
     held: &mut Vec<usize>,
 ) -> Option<Doubt> {
+    if fit.corners.len() < MIN_PICTURES {
+        return None;
+    }
+    // The choices before this one end near the optimum, and a lens may fold only there.
+    *solution = fit.fine(held, solution.state.clone()).so_far()?;
     fit.camera(solution).fold()?;
     for lens in [Lens::Five, Lens::Four, Lens::One] {
         let fewer: Vec<usize> = lens.held().into_iter().chain(held.contains(&SKEW).then_some(SKEW)).collect();

@@ -118,8 +118,8 @@ pub(super) fn without(state: &State, held: &[usize]) -> State {
     state
 }
 
-/// True if the change of the rays exceeds the uncertainty that the additional terms add to them, and if where boards were
-/// seen the rays are not known far worse than what the terms explain.
+/// True if the change of the rays exceeds the uncertainty that the additional terms add to them, and if the rays are
+/// not known far worse, where boards were seen, than what the terms explain.
 fn worth_its_noise(fit: &Fit<'_>, plain: &Solution<State>, more: &Solution<State>) -> bool {
     let (Some(of_plain), Some(of_more)) = (fit.covariance(plain), fit.covariance(more)) else { return false };
     let [a, b] = [plain, more].map(|s| fit.camera(s));

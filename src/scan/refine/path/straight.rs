@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 
 /// Least number of compared halves of shots.
 const FEWEST: usize = 16;
-/// Poses that scatter by less than this, mm and rad, count as exact.
-const EXACT: f64 = 1e-8;
+/// Poses that scatter by less than this, mm and rad, count as exact: files round to nanometres.
+const EXACT: f64 = 1e-6;
 
 /// Scatter of the reported poses; in scan.json.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
