@@ -62,13 +62,19 @@ pub(in crate::calibrate::camera) fn by_folding(
         if fewer.len() <= held.len() {
             continue;
         }
-        // From no lens at all: what is left of a richer lens is far from the optimum.
-        let start = without(&solution.state, &(LENS..SKEW).collect::<Vec<_>>());
-        let Some(plain) = fit.fine(&fewer, start).so_far() else { continue };
+        // What is left of a richer lens may be far from the optimum, and so may no lens at all. Twice, because a fit that
+        // had to go far ends before it settles.
+        let starts = [fewer.clone(), (LENS..SKEW).collect()].map(|zero| without(&solution.state, &zero));
+        let fits = starts.into_iter().filter_map(|start| {
+            let near = fit.fine(&fewer, start).so_far()?;
+            fit.fine(&fewer, near.state).so_far()
+        });
+        let best = fits.min_by(|a, b| squares(fit, a).total_cmp(&squares(fit, b)));
+        let Some(plain) = best else { continue };
         let explained_px = (squares(fit, &plain) - squares(fit, solution)).max(0.0).sqrt();
         let nearly = explained_px < FOLDED_PX.max(NEARLY * squares(fit, solution).sqrt());
         if fit.camera(&plain).fold().is_none() && nearly {
-            let doubt = Doubt::of(fit, (&plain, solution), Lens::Five, explained_px);
+            let doubt = Doubt { folds: true, ..Doubt::of(fit, (&plain, solution), Lens::Five, explained_px) };
             (*solution, *held) = (plain, fewer);
             return Some(doubt);
         }

@@ -37,7 +37,7 @@ pub struct Doubt {
     /// How far it moves the viewing rays, rms px over the image.
     pub rays_px: f64,
     /// How it moves all parameters, its own too.
-    moved: Parameters,
+    pub(super) moved: Parameters,
     /// The lens would fold back inside the image. Otherwise the family explains no more than [`SHARED_PX`].
     pub folds: bool,
 }
@@ -52,8 +52,7 @@ impl Doubt {
     ) -> Doubt {
         let [plain, more] = [plain, more].map(|s| fit.camera(s));
         let moved = more.parameters() - plain.parameters();
-        let folds = more.fold().is_some();
-        Doubt { lens, explained_px, rays_px: rays_apart(&plain, &more), moved, folds }
+        Doubt { lens, explained_px, rays_px: rays_apart(&plain, &more), moved, folds: false }
     }
 
     /// Covariance that the doubt about the family adds to a camera without it. The camera's own parameters move so that
