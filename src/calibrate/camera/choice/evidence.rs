@@ -62,8 +62,8 @@ pub(in crate::calibrate::camera) fn by_folding(
         if fewer.len() <= held.len() {
             continue;
         }
-        // What is left of a richer lens may be far from the optimum, and so may no lens at all. Twice, because a fit that
-        // had to go far ends before it settles.
+        // What is left of a richer lens may be far from the optimum, and so may no lens at all. Twice, because a fit
+        // that had to go far ends before it settles.
         let starts = [fewer.clone(), (LENS..SKEW).collect()].map(|zero| without(&solution.state, &zero));
         let fits = starts.into_iter().filter_map(|start| {
             let near = fit.fine(&fewer, start).so_far()?;
