@@ -38,7 +38,8 @@ pub struct Doubt {
     pub rays_px: f64,
     /// How it moves all parameters, its own too.
     pub(super) moved: Parameters,
-    /// The lens would fold back inside the image. Otherwise the family explains no more than [`SHARED_PX`].
+    /// The lens would fold back inside the image. Otherwise the family explains no more than errors that all
+    /// features share.
     pub folds: bool,
 }
 
