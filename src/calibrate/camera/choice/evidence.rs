@@ -1,5 +1,5 @@
-//! In: a camera solved with all terms. Out: the terms that the pictures support, and of which no point of the image is
-//! another's image; the others are held at zero.
+//! In: a camera solved with all terms. Out: the terms that the pictures support and that do not fold the lens back
+//! inside the image; the others are held at zero.
 //! Frame and unit: those of the lens.
 
 use super::families::{Doubt, squares, without};
@@ -40,12 +40,12 @@ pub(in crate::calibrate::camera) fn by_evidence(fit: &Fit<'_>, solution: &mut So
 /// residuals, for fewer terms to replace it. In photographs of two cameras whose boards left the corners of the image
 /// free, k3 explained 0.006 and 0.010 px.
 const FOLDED_PX: f64 = 0.1;
-/// Of fewer pictures each set folds another lens, and what is left scatters less than it states.
-const MIN_PICTURES: usize = 8;
 const NEARLY: f64 = 0.5;
+/// With fewer pictures the halves of one set fold in different terms. Those that are left scatter less than they state.
+const MIN_PICTURES: usize = 8;
 
-/// Replaces a lens that folds back inside the image, which no lens does, by the one of most terms that does not. What
-/// the terms explained becomes a doubt. Nothing happens if none fits nearly as well.
+/// Replaces a lens that folds back inside the image by the lens of most terms that does not. What the terms explained
+/// becomes a doubt. Nothing changes if no such lens fits nearly as well.
 pub(in crate::calibrate::camera) fn by_folding(
     fit: &Fit<'_>,
     solution: &mut Solution<State>,
