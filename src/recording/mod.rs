@@ -8,6 +8,7 @@ mod frame;
 mod frames;
 mod meta;
 mod motion;
+pub mod odd;
 mod pose_csv;
 mod poses;
 pub mod profiles;
@@ -221,12 +222,12 @@ impl Recording {
                 "frame {index} names no pose; there are {frames} frames and {} poses",
                 poses.len()
             ))
-            .cause("a picture or a pose was lost, so it is unknown which belong together")
-            .next("write \"pose\" into every frame of meta.json"));
+            .cause("a picture or a pose was lost, so it is unknown which belong together; or an axis moved, no robot")
+            .next("write \"pose\" into every frame of meta.json, or state the \"motion\" of the axis"));
         }
         let k = frame.pose.unwrap_or(index);
         poses.get(k).ok_or_else(|| {
-            Fault::input(format!("frame {index} asks for pose {k}, the pose file has {}", poses.len()))
+            Fault::input(format!("frame {index} needs pose {k}, the pose file has {}", poses.len()))
                 .cause("the pose file belongs to another recording, or ends early")
                 .next("export the poses of all pictures again")
         })

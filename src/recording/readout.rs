@@ -2,6 +2,7 @@
 //! those have none. The sensor's hot pixels serve to check it.
 
 use super::Recording;
+use super::odd::{Odd, odd};
 use crate::camera::Readout;
 use crate::fault::{Fault, Result};
 use crate::raster::HotPixels;
@@ -62,6 +63,21 @@ pub fn hot_pixels(recordings: &[Recording]) -> HotPixels {
 }
 
 impl Recording {
+    /// A remark if its first picture seems to be a colour sensor's mosaic.
+    ///
+    /// # Errors
+    /// The first picture seems to have its bytes exchanged. A picture that cannot be read is reported where it is used.
+    pub fn grey_levels(&self) -> Result<Option<String>> {
+        let first = self.meta.frames.iter().find_map(|f| f.ambient.as_ref().or(f.laser.as_ref()));
+        match first.and_then(|name| Some((name, odd(&self.picture(name).ok()?)?))) {
+            None => Ok(None),
+            Some((name, seems @ Odd::Mosaic(_))) => Ok(Some(format!("{name}: {}", seems.words()))),
+            Some((name, seems @ Odd::BytesExchanged)) => Err(Fault::input(format!("{name}: {}", seems.words()))
+                .cause("a program that writes numbers in its computer's order")
+                .next("exchange the two bytes of each level, or save the pictures as PNG or TIFF")),
+        }
+    }
+
     /// Sets the readout that the user states for its pictures.
     ///
     /// # Errors

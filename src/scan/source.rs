@@ -258,24 +258,11 @@ fn slip_of(frame: &FrameRef) -> Option<Slip> {
 fn posed(recording: &Recording, poses: Option<&str>) -> Result<Vec<Stood>> {
     let poses = recording.poses(poses)?;
     let frames = recording.meta.frames.iter().enumerate();
-    let stand = |(i, name, pose): (usize, &String, Option<usize>)| {
-        let pose = pose.ok_or_else(|| {
-            Fault::input(format!("frame {i} ({name}) has no pose"))
-                .cause("the recording was made without a robot")
-                .next("add \"pose\" to each frame of meta.json, or state the \"motion\" of the axis that moved")
-        })?;
-        let Some(base_from_flange) = poses.get(pose) else {
-            return Err(Fault::input(format!(
-                "frame {i} ({name}) needs pose {pose}, the pose file has {}",
-                poses.len()
-            ))
-            .cause("the pose file was cut short, or belongs to another recording")
-            .next("record the poses again, or remove the frames without poses from meta.json"));
-        };
-        let frame = &recording.meta.frames[i];
+    let stand = |(i, frame, name): (usize, &FrameRef, &String)| {
+        let base_from_flange = recording.pose_of(i, &poses).map_err(|e| e.at(name))?;
         Ok((frame.lasers(), Ok(Stand::Robot(*base_from_flange)), slip_of(frame)))
     };
-    frames.filter_map(|(i, f)| Some((i, f.laser.as_ref()?, f.pose))).map(stand).collect()
+    frames.filter_map(|(i, f)| Some((i, f, f.laser.as_ref()?))).map(stand).collect()
 }
 
 /// Pictures with the laser on and the axis' counts. A picture with an unknown count becomes a bad shot; no count is

@@ -211,7 +211,7 @@ fn poses_that_cannot_be_are_named() {
     fails(&|p| p.reverse(), &["reverse order"]);
     fails(&|p| p.rotate_left(1), &["1 places"]);
     fails(&|p| p[5] = p[4], &["duplicate", "ambient_0004.png", "ambient_0005.png"]);
-    fails(&|p| p.truncate(12), &["asks for pose 12", "has 12"]);
+    fails(&|p| p.truncate(12), &["needs pose 12", "has 12"]);
     fails(
         &|p| {
             let old = p.clone();

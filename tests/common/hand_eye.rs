@@ -78,29 +78,35 @@ fn read(rng: &mut Pcg64, s: &Station, pose: &Rigid<Near, Far>, noise: Noise) -> 
     }
 }
 
-pub fn pairs(rng: &mut Pcg64, s: &Station, noise: Noise, believed: &Intrinsics) -> Vec<Pair> {
-    s.poses
+/// Pixels of the station's features at a pose, where they truly lie at `places`.
+pub fn seen(rng: &mut Pcg64, s: &Station, i: usize, px: f64, places: &[Vec3]) -> SeenBoard {
+    let true_board = s.truth.expected(&s.poses[i]);
+    let pixels: Vec<Vec2> = places
         .iter()
-        .enumerate()
-        .map(|(i, pose)| {
-            let true_board = s.truth.expected(pose);
-            let pixels: Vec<Vec2> = s
-                .points
-                .iter()
-                .map(|p| {
-                    s.camera.pixel_from_point(&true_board.point(p)).unwrap()
-                        + Vec2::new(gauss(rng, noise.px), gauss(rng, noise.px))
-                })
-                .collect();
-            let seen = SeenBoard {
-                name: format!("picture {i}"),
-                points: s.points.clone(),
-                pixels,
-                sigmas_px: vec![1.0; s.points.len()],
-            };
-            Pair::new(read(rng, s, pose, noise), measure(&seen, believed, &true_board).unwrap())
-        })
-        .collect()
+        .map(|p| s.camera.pixel_from_point(&true_board.point(p)).unwrap() + Vec2::new(gauss(rng, px), gauss(rng, px)))
+        .collect();
+    let sigmas_px = vec![1.0; s.points.len()];
+    SeenBoard { name: format!("picture {i}"), points: s.points.clone(), pixels, sigmas_px }
+}
+
+pub fn pairs(rng: &mut Pcg64, s: &Station, noise: Noise, believed: &Intrinsics) -> Vec<Pair> {
+    seen_pairs(rng, s, noise, believed, &s.points).into_iter().map(|(_, pair)| pair).collect()
+}
+
+/// The same with a board whose features lie at `places`, measured as drawn, and what was seen of it.
+pub fn seen_pairs(
+    rng: &mut Pcg64,
+    s: &Station,
+    noise: Noise,
+    believed: &Intrinsics,
+    places: &[Vec3],
+) -> Vec<(SeenBoard, Pair)> {
+    let pair = |i: usize| {
+        let seen = seen(rng, s, i, noise.px, places);
+        let measured = measure(&seen, believed, &s.truth.expected(&s.poses[i])).unwrap();
+        (seen, Pair::new(read(rng, s, &s.poses[i], noise), measured))
+    };
+    (0..s.poses.len()).map(pair).collect()
 }
 
 pub const LEVELS: [Noise; 4] = [

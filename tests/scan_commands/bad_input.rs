@@ -119,6 +119,24 @@ fn a_bad_shot_can_be_left_out_and_is_listed() {
 }
 
 #[test]
+fn frames_that_name_no_pose_are_paired_in_order_where_none_is_missing() {
+    let b = Bench::new(20);
+    let points = || {
+        sheetlight(&b.args(&[]));
+        let points = sheetlight::scan::read_cloud(&Path::new(&b.out).join("cloud.ply")).unwrap();
+        std::fs::remove_dir_all(&b.out).unwrap();
+        points
+    };
+    let named = points();
+    (0..20).for_each(|i| b.edit("meta.json", &format!(",\"pose\":{i}}}"), "}"));
+    assert!(points() == named, "other points where the poses were paired in order");
+    let path = b.recording.join("poses.json");
+    let poses = sheetlight::recording::load_poses(&path).unwrap().poses;
+    sheetlight::recording::save_poses(&path, &poses[..19]).unwrap();
+    b.fails(&[], &["names no pose", "20 frames and 19 poses", "or a pose was lost"]);
+}
+
+#[test]
 fn repeated_pictures_and_poses_are_named() {
     let b = Bench::new(20);
     let remarks = || {

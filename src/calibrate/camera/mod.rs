@@ -1,6 +1,7 @@
 //! In: boards as seen in pictures. Out: the camera's intrinsics and lens with covariance and verdict.
 //! Frame and unit: camera frame; px, mm (docs/math.md, Camera calibration).
 
+pub mod board_shape;
 mod bundle;
 mod choice;
 mod fit;

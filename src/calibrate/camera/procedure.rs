@@ -75,10 +75,12 @@ pub fn calibrate(
     options.check()?;
     let (width, height) = one_size(recordings)?;
     let readout = one_readout(recordings)?;
+    let remarks: Vec<Option<String>> = recordings.iter().map(Recording::grey_levels).collect::<Result<_>>()?;
     let Pictures { found, left_out, mut inputs } = pictures(recordings, &options.find, progress)?;
     let mut result = from_observations(found, left_out, width, height, options)?;
     inputs.retain(|name, _| name.ends_with("meta.json") || result.used.iter().any(|o| o.name == *name));
     result.calibration.inputs = inputs;
+    result.calibration.quality.reasons.extend(remarks.into_iter().flatten());
     result.calibration.readout = readout;
     result.calibration.hot_pixels = hot_pixels(recordings).places().to_vec();
     Ok(result)

@@ -12,10 +12,19 @@ use std::path::{Path, PathBuf};
 /// Reads profiles from one file with many, or from a folder with one file each, in the order of their names (numbers
 /// in names are compared as numbers). Profiles that a table numbers are in the order of their numbers. Places without a
 /// measurement stay, with a number that is not finite.
+///
+/// # Errors
+/// Files that cannot be read; numbers that are not in mm; a profile twice, or left out.
 pub fn load(path: &Path) -> Result<Vec<Profile>> {
     let mut out = Vec::new();
+    let mut stated = true;
     for f in files_of(path)? {
-        out.push(load_file(&f)?);
+        let text = crate::files::read_text(&f)?;
+        stated &= says_mm(&text);
+        out.push(read_file(&text, &f)?);
+    }
+    if !stated {
+        wide_enough(out.iter().flat_map(|read| &read.profiles)).map_err(|e| e.at(path.display()))?;
     }
     let numbers: Vec<f64> = out.iter().filter_map(|read| read.numbers.as_ref()).flatten().copied().collect();
     // The files of a folder may each begin at 0, or each hold the profile of one number.
@@ -89,15 +98,34 @@ pub fn files_of(path: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-fn load_file(path: &Path) -> Result<Read> {
-    let text = crate::files::read_text(path)?;
+/// No line-profile sensor sees less than this along its line, mm; none sees as many metres.
+const NARROWEST_MM: f64 = 1.0;
+
+/// Refuses profiles that are too narrow to be in mm.
+fn wide_enough<'a>(profiles: impl Iterator<Item = &'a Profile>) -> Result<()> {
+    let x = profiles.flat_map(|p| &p.points).map(|p| p[0]).filter(|x| x.is_finite());
+    let (low, high) = x.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
+    if high <= low || high - low >= NARROWEST_MM {
+        return Ok(());
+    }
+    Err(Fault::input(format!("x is from {low} to {high} in all profiles, {:.3} mm wide", high - low))
+        .cause("profiles in metres: no line-profile sensor sees less than 1 mm along its line")
+        .next("export the profiles in mm; if they are, state it in a line \"# unit: mm\""))
+}
+
+/// Whether a table states mm, in a comment or in the names of its columns.
+fn says_mm(text: &str) -> bool {
+    stated_mm(text, "").is_ok_and(|stated| stated) || has_header(text) && head(text).0.contains("mm")
+}
+
+fn read_file(text: &str, path: &Path) -> Result<Read> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let read = match () {
-        () if text.contains("opencv-matrix") => from_yaml(&text, &stem).map(Read::from),
+        () if text.contains("opencv-matrix") => from_yaml(text, &stem).map(Read::from),
         // Its brackets are those of units.
-        () if has_header(&text) => read_csv(&text, &stem),
-        () if text.contains('[') => from_brackets(&text, &stem).map(Read::from),
-        () => read_csv(&text, &stem),
+        () if has_header(text) => read_csv(text, &stem),
+        () if text.contains('[') => from_brackets(text, &stem).map(Read::from),
+        () => read_csv(text, &stem),
     };
     read.map_err(|e| e.at(path.display()))
 }
@@ -359,6 +387,21 @@ mod tests {
         assert_eq!(firsts(["profile,x,z\n1,0,11\n", "profile,x,z\n0,0,10\n"]), [10.0, 11.0]);
         let each = ["profile,x,z\n1,0,11\n0,0,10\n", "profile,x,z\n0,0,12\n1,0,13\n"];
         assert_eq!(firsts(each), [10.0, 11.0, 12.0, 13.0]);
+    }
+
+    #[test]
+    fn profiles_in_metres_are_refused_and_narrow_ones_that_state_mm_are_not() {
+        let dir = tempfile::tempdir().unwrap();
+        let read = |text: &str| {
+            std::fs::write(dir.path().join("p.csv"), text).unwrap();
+            load(&dir.path().join("p.csv")).map_err(|e| e.to_string())
+        };
+        let metres = "x,z\n-0.04,0.21\n0,0.2\n0.04,0.21\n";
+        let said = read(metres).unwrap_err();
+        assert!(said.contains("from -0.04 to 0.04") && said.contains("0.080 mm") && said.contains("metres"), "{said}");
+        assert!(read(&format!("# units: mm\n{metres}")).is_ok());
+        assert!(read(&metres.replace("x,z", "x [mm],z [mm]")).is_ok());
+        assert!(read("x,z\n-40,210\n0,200\n40,210\n").is_ok());
     }
 
     #[test]

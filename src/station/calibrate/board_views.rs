@@ -3,7 +3,7 @@
 //! Frame and unit: camera_from_board, mm.
 
 use crate::calibrate::boards::{FindOptions, find};
-use crate::calibrate::measured_pose::{MeasuredPose, measure_view};
+use crate::calibrate::measured_pose::{MeasuredPose, SeenBoard, measure_view};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::raster::Image;
@@ -18,7 +18,9 @@ pub struct FrameBoard {
     pub frame: usize,
     /// The board as meta.json describes it; an unstated dot diameter is the pictures' median, mm.
     pub board: BoardSpec,
-    /// camera_from_board as measured, mm, with the covariance from its pixels.
+    /// The features, with their places as drawn.
+    pub seen: SeenBoard,
+    /// camera_from_board as measured with the board as drawn, mm, with the covariance from its pixels.
     pub pose: MeasuredPose,
     /// The board looks the same after a turn: only its plane is known, not its origin.
     pub ambiguous: bool,
@@ -44,6 +46,7 @@ pub fn boards(
     let same = camera.same_pictures(meta.image.size(), meta.image.readout.as_ref());
     same.map_err(|e| e.at(recording.folder.display()))?;
     recording.read_alike(&camera.hot_pixels)?;
+    recording.grey_levels()?;
     let camera = &camera.value;
     let frames: Vec<(usize, &FrameRef, &str)> =
         meta.frames.iter().enumerate().filter_map(|(i, f)| Some((i, f, f.ambient.as_deref()?))).collect();
@@ -107,8 +110,9 @@ type Seen = (FrameBoard, Option<f64>);
 fn one(frame: usize, name: &str, board: &BoardSpec, picture: &Image, camera: &Intrinsics) -> Result<Seen> {
     let view = find(picture, board, &FindOptions::default())?;
     let pose = measure_view(name, camera, board, &view)?;
+    let seen = SeenBoard::from_view(name, board, &view);
     let board = board.beginning(view.begins_white);
-    Ok((FrameBoard { frame, board, pose, ambiguous: view.ambiguous }, view.dot_diameter))
+    Ok((FrameBoard { frame, board, seen, pose, ambiguous: view.ambiguous }, view.dot_diameter))
 }
 
 /// Pictures that do not show the colour of their board's first square take it from the first picture that does.

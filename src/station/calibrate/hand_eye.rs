@@ -4,13 +4,14 @@
 
 use super::board_views::{FrameBoard, boards};
 use crate::calibrate::boards::turns;
+use crate::calibrate::camera::board_shape::as_shaped;
 use crate::calibrate::hand_eye::closed::Pair;
 use crate::calibrate::hand_eye::options::{HandEyeOptions, Mount};
 use crate::calibrate::hand_eye::report::{covariance, judge, page};
 use crate::calibrate::hand_eye::solve::solve;
 use crate::calibrate::hand_eye::turns::{read_with, resolve};
 use crate::calibrate::limits::Asked;
-use crate::calibrate::measured_pose::{AboutCamera, MeasuredPose, intrinsic_covariance};
+use crate::calibrate::measured_pose::{AboutCamera, MeasuredPose, SeenBoard, intrinsic_covariance};
 use crate::calibrate::report::Page;
 use crate::camera::{CameraCovariance, Distortion, Intrinsics};
 use crate::fault::{Fault, Result};
@@ -91,7 +92,7 @@ pub fn calibrate_hand_eye(
     let camera = rig.need_camera()?;
     let file = recording.pose_file(run.poses.as_deref())?;
     let poses: Vec<_> = file.poses.iter().zip(&file.written).collect();
-    let seen = boards(recording, camera, progress)?;
+    let mut seen = boards(recording, camera, progress)?;
     let mut pairs = Vec::new();
     for b in &seen.found {
         let pose = recording.pose_of(b.frame, &poses).map_err(|e| e.at(&b.pose.name))?;
@@ -99,8 +100,9 @@ pub fn calibrate_hand_eye(
     }
     let mut notes: Vec<String> =
         seen.missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))).collect();
+    notes.extend(one_origin(&mut pairs, &mut seen.found, run.solver.seed)?);
+    notes.extend(shaped(&mut pairs, &seen.found, &camera.value));
     let again = said_already(recording, camera, &mut pairs)?;
-    notes.extend(one_origin(&mut pairs, &seen.found, run.solver.seed)?);
     if again > 0 {
         notes.push(format!(
             "{again} of these pictures were also used to calibrate the camera: their information about it is used only \
@@ -226,7 +228,7 @@ fn said_already(recording: &Recording, camera: &Calibration<Intrinsics>, pairs: 
 }
 
 /// Gives a board that looks the same after a turn one origin in all pictures, and returns a remark.
-fn one_origin(pairs: &mut [Pair], found: &[FrameBoard], seed: u64) -> Result<Option<String>> {
+fn one_origin(pairs: &mut [Pair], found: &mut [FrameBoard], seed: u64) -> Result<Option<String>> {
     if !found.iter().any(|b| b.ambiguous) {
         return Ok(None);
     }
@@ -237,8 +239,9 @@ fn one_origin(pairs: &mut [Pair], found: &[FrameBoard], seed: u64) -> Result<Opt
     }
     let turns = turns(&found[0].board);
     let chosen = resolve(pairs, &turns, seed)?;
-    for (pair, k) in pairs.iter_mut().zip(&chosen) {
+    for ((pair, board), k) in pairs.iter_mut().zip(found).zip(&chosen) {
         *pair = read_with(pair, &turns[*k]);
+        board.seen.points.iter_mut().for_each(|x| *x = turns[*k].turn.point(x));
     }
     let anew = chosen.iter().filter(|k| **k != 0).count();
     Ok(Some(format!(
@@ -246,6 +249,27 @@ fn one_origin(pairs: &mut [Pair], found: &[FrameBoard], seed: u64) -> Result<Opt
          read turned",
         chosen.len()
     )))
+}
+
+/// Measures a board that is not as drawn with its shape, and returns a remark. Left as drawn, a bend turns the board's
+/// pose otherwise in each picture, and only a part of that shows in the residuals.
+fn shaped(pairs: &mut [Pair], found: &[FrameBoard], camera: &Intrinsics) -> Option<String> {
+    let board = &found.first()?.board;
+    if found.iter().any(|b| b.board != *board) {
+        return None;
+    }
+    let features = board.features();
+    let seen: Vec<SeenBoard> = found.iter().map(|b| b.seen.clone()).collect();
+    let poses: Vec<_> = pairs.iter().map(|p| p.seen.camera_from_board).collect();
+    let with_shape = as_shaped(&features, &seen, &poses, camera)?;
+    let rms = |poses: &mut dyn Iterator<Item = &MeasuredPose>| crate::calibrate::limits::rms(poses.map(|p| p.rms_px));
+    let (drawn, now) = (rms(&mut pairs.iter().map(|p| &p.seen)), rms(&mut with_shape.poses.iter()));
+    pairs.iter_mut().zip(with_shape.poses).for_each(|(pair, pose)| pair.seen = pose);
+    let [within, out] = with_shape.shape.departs(&features);
+    Some(format!(
+        "the board is not as drawn: its features stand off by {within:.3} mm rms in its plane and {out:.3} mm out of \
+         it. They are used where the pictures show them, and fit to {now:.3} px rms instead of {drawn:.3} px"
+    ))
 }
 
 pub(in crate::station) fn first_line(text: &str) -> &str {

@@ -40,7 +40,7 @@ impl Done<'_> {
         if state.cut > 0 {
             state.peaks.insert("beyond the list: more than a twentieth of the pictures lit".into(), state.cut);
         }
-        let levels = self.seen.remark();
+        let levels: Vec<String> = self.seen.remarks().collect();
         ScanReport {
             format: FORMAT,
             program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),

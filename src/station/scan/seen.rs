@@ -5,6 +5,7 @@
 use crate::camera::Intrinsics;
 use crate::geometry::{Camera, Plane, Vec2};
 use crate::raster::{Image, Pixels};
+use crate::recording::odd::{Odd, odd};
 
 /// Levels of a scan's pictures, from the shots 0, 1, 2, 4, 8, ...
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -24,6 +25,9 @@ pub struct Seen {
     pub light_px: Option<[u32; 4]>,
     /// x0, y0, x1, y1 around the pixels in which the laser plane lies within the working volume.
     pub looked_for_px: Option<[u32; 4]>,
+    /// What the first picture seems to be instead of grey levels.
+    #[serde(skip)]
+    odd: Option<Odd>,
     #[serde(skip)]
     medians: Vec<u16>,
 }
@@ -53,6 +57,9 @@ impl Seen {
     pub fn look(&mut self, index: u32, image: &Image) {
         if index != 0 && !index.is_power_of_two() {
             return;
+        }
+        if self.pictures == 0 {
+            self.odd = odd(image);
         }
         match &image.pixels {
             Pixels::U8(p) => self.levels(image, p),
@@ -111,8 +118,12 @@ impl Seen {
         )
     }
 
-    /// A warning if the levels end where those of a camera of fewer bits would.
-    pub fn remark(&self) -> Option<String> {
+    /// Warnings if the levels end where those of a camera of fewer bits would, or seem to be no grey levels.
+    pub fn remarks(&self) -> impl Iterator<Item = String> {
+        self.shallow().into_iter().chain(self.odd.map(|odd| odd.words()))
+    }
+
+    fn shallow(&self) -> Option<String> {
         let most = (10..16).map(|bits| (1u16 << bits) - 1).find(|most| self.brightest_level <= *most)?;
         // Above three quarters the pictures reach the top of that depth; darker ones may be of any.
         let reached = u32::from(self.brightest_level) * 4 > u32::from(most) * 3;
@@ -135,7 +146,12 @@ impl Seen {
             (Some(a), Some(b)) => a[0] > b[2] || b[0] > a[2] || a[1] > b[3] || b[1] > a[3],
             _ => false,
         };
-        if f64::from(self.brightest_level) < DARK * full {
+        if self.odd == Some(Odd::BytesExchanged) {
+            (
+                "the two bytes of each level seem to be exchanged: the file has the low byte first",
+                "exchange them, or save the pictures as PNG or TIFF",
+            )
+        } else if f64::from(self.brightest_level) < DARK * full {
             (
                 "the pictures are dark: the laser was off, or the exposure is far too short",
                 "expose longer, or switch the laser on",
@@ -208,7 +224,7 @@ mod tests {
         let remark = |bits, level| {
             let mut seen = Seen::default();
             seen.look(0, &Image::from_u16(8, 8, bits, vec![level; 64]));
-            seen.remark()
+            seen.shallow()
         };
         assert!(remark(16, 3900).unwrap().contains("12 bits"), "{:?}", remark(16, 3900));
         assert!([(16, 2500), (16, 20_000), (12, 1000), (10, 1000)].iter().all(|(b, l)| remark(*b, *l).is_none()));

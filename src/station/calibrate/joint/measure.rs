@@ -76,7 +76,8 @@ impl Finders<'_> {
     /// A laser's picture of a stop without the room's light, and the picture in room light.
     fn alone(&self, (stop, pose): &Placed<'_>, laser: &Picture) -> Result<(Image, Image, FrameBoard)> {
         let board = stop.board.clone();
-        let b = FrameBoard { frame: 0, board, pose: pose.clone(), ambiguous: stop.view.ambiguous };
+        let seen = SeenBoard::from_view(&stop.name, &stop.board, &stop.view);
+        let b = FrameBoard { frame: 0, board, seen, pose: pose.clone(), ambiguous: stop.view.ambiguous };
         let room = self.picture(&stop.room)?;
         Ok((room_light::alone(self.picture(laser)?, &room, &b, self.camera), room, b))
     }

@@ -55,7 +55,13 @@ pub fn terms(file: &Map<String, Value>) -> Result<(Vec<f64>, String)> {
     let lists: Vec<(&String, Vec<f64>)> = there.map(read).collect::<Result<_>>()?;
     let Some((key, terms)) = lists.first() else { return without(file) };
     let lens = Distortion::from_opencv(terms);
-    if let Some((other, _)) = lists.iter().find(|(_, terms)| Distortion::from_opencv(terms) != lens) {
+    let differs = |name: &&String| {
+        let term = TERMS.iter().position(|t| name.eq_ignore_ascii_case(t));
+        let stated = file.get(*name).and_then(Value::as_f64);
+        term.zip(stated).is_some_and(|(term, stated)| stated != terms.get(term).copied().unwrap_or(0.0))
+    };
+    let another = lists.iter().find(|(_, terms)| Distortion::from_opencv(terms) != lens).map(|(other, _)| *other);
+    if let Some(other) = another.or_else(|| file.keys().find(differs)) {
         return Err(Fault::input(format!("states two lenses that differ: {key} and {other}"))
             .cause("the file of two calibrations, or of two cameras")
             .next("keep the one that belongs to the camera matrix"));
@@ -131,6 +137,8 @@ mod tests {
         // The same lens twice is one lens; four terms are five with k3 = 0.
         let twice = json!({ "dist": five[..4], "D": [-0.1, 0.05, 0.001, -0.002, 0.0], "dist_coeffs": null });
         assert!(read(twice).is_ok());
+        let single = json!({ "D": five, "k1": -0.1, "K2": 0.05, "p1": 0.001, "k6": 0 });
+        assert!(read(single).is_ok());
         // Other keys that begin alike.
         let more = json!({ "D": five, "distance_mm": [1, 2, 3], "distortion_model": "plumb_bob", "dist": "brown" });
         assert_eq!(read(more).unwrap().0, five);
@@ -152,11 +160,14 @@ mod tests {
             assert!(fault.what.contains("does not state its lens"), "{file}: {fault}");
             assert!(fault.next.contains("distortion_coefficients: [0, 0, 0, 0, 0]"), "{file}: {fault}");
         }
+        let five = [-0.1, 0.05, 0.001, -0.002, 0.01];
         let single = read(json!({ "k1": -0.1, "K2": 0.05, "p1": 0 })).unwrap_err();
         assert!(single.what.contains("K2") && single.what.contains("k1") && single.what.contains("p1"), "{single}");
         assert!(single.next.contains("[k1, k2, p1, p2, k3]"), "{single}");
         for (file, wanted) in [
             (json!({ "dist": [-0.1, 0.05, 0, 0, 0], "D": [-0.2, 0.05, 0, 0, 0] }), "two lenses that differ"),
+            (json!({ "D": five, "k1": -0.2 }), "two lenses that differ: D and k1"),
+            (json!({ "D": five, "k4": 0.3 }), "two lenses that differ: D and k4"),
             (json!({ "dist_coeffs": [-0.1, 0.05, 0] }), "the lens: 3 numbers"),
             (json!({ "dist_coeffs": { "k1": -0.1, "k2": 0.05 } }), "the lens: something else"),
         ] {
