@@ -13,17 +13,17 @@ pub enum Odd {
     BytesExchanged,
 }
 
-/// Of larger pictures, about this many rows are looked at.
+/// A larger picture is judged by about this number of rows.
 const ROWS: usize = 512;
-/// From this share on, the diagonals are not those of a grey sensor: its taps agree to one or two hundredths, and a
-/// stripe of 0.6 px at 45 degrees makes 0.06. Rows or columns that differ, as under a thin stripe along them, make
-/// none.
+/// Diagonals that differ by this share are those of a mosaic. A thin stripe along rows or columns makes rows or columns
+/// differ, but not diagonals; one between them makes diagonals differ by less.
 const MOSAIC: f64 = 0.12;
-/// Only squares whose brightest pixel has this part of full scale are compared, and at least so many of them.
+/// A 2x2 square is lit if its brightest pixel reaches this fraction of full scale: 1 in 16.
 const LIT: u16 = 16;
+/// Fewer lit squares decide nothing.
 const FEWEST: u64 = 200;
-/// Neighbours in a picture differ by a small part of its scatter. With exchanged bytes they differ by more than this
-/// part, and by this many times as much as with the bytes in order.
+/// Roughness is the mean difference of neighbours in a row as a share of the levels' scatter. Exchanged bytes make it
+/// exceed the first limit, and exceed the roughness with the bytes in order by the second factor.
 const ROUGH: f64 = 0.1;
 const ROUGHER: f64 = 4.0;
 

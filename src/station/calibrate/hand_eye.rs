@@ -251,8 +251,8 @@ fn one_origin(pairs: &mut [Pair], found: &mut [FrameBoard], seed: u64) -> Result
     )))
 }
 
-/// Measures a board that is not as drawn with its shape, and returns a remark. Left as drawn, a bend turns the board's
-/// pose otherwise in each picture, and only a part of that shows in the residuals.
+/// Measures the boards again with their shape if the board is not as drawn, and returns a remark. A bend that is not
+/// estimated turns the board's pose by a different angle in each picture.
 fn shaped(pairs: &mut [Pair], found: &[FrameBoard], camera: &Intrinsics) -> Option<String> {
     let board = &found.first()?.board;
     if found.iter().any(|b| b.board != *board) {
