@@ -23,6 +23,8 @@ mod pairing;
 mod profiles;
 #[path = "capture/recording.rs"]
 mod recording;
+#[path = "capture/registers.rs"]
+mod registers;
 #[path = "capture/robot.rs"]
 mod robot;
 #[path = "capture/sources.rs"]

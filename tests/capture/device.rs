@@ -2,34 +2,16 @@
 //! the stream channel names, lost packets on request; test equipment, written after the standard's registers.
 //! Frame and unit: big endian on the wire; times in ns.
 
+use super::registers::{
+    ADDRESS, BAYER, CAN, CCP, COMPONENT, COORD3D_C16, DOES, ENABLED, FORMAT, FORMATS, LATCH, MODE, MONO8, MONO12,
+    OF_AXES, PACKET, PARTS, PORT, Registers, START, XML, registers, xml,
+};
 use sheetlight::raster::{Image, Pixels};
 use std::collections::VecDeque;
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-
-const WIDTH: u32 = 0x10000;
-const HEIGHT: u32 = 0x10004;
-const FORMAT: u32 = 0x10008;
-const PAYLOAD: u32 = 0x1000c;
-const START: u32 = 0x10010;
-const EXPOSURE: u32 = 0x10014;
-const XML: u32 = 0x20000;
-const CCP: u32 = 0x0a00;
-const PORT: u32 = 0x0d00;
-const PACKET: u32 = 0x0d04;
-const ADDRESS: u32 = 0x0d18;
-const LATCH: u32 = 0x0944;
-const MONO8: u32 = 0x0108_0001;
-const MONO12: u32 = 0x0110_0005;
-const BAYER: u32 = 0x0108_0009;
-/// PFNC's code of heights of 16 bits.
-const COORD3D_C16: u32 = 0x0110_00b8;
-/// Of the 3D Scan Control: the output mode, the selector, and for each coordinate scale, offset and invalid number.
-const MODE: u32 = 0x10020;
-const SELECTOR: u32 = 0x10024;
-const OF_AXES: u32 = 0x10030;
 
 /// What the camera does wrong.
 #[derive(Clone, Copy, Default)]
@@ -45,7 +27,7 @@ pub struct Faults {
     /// Its output mode is UncalibratedC.
     pub uncalibrated: bool,
     /// It sends payloads of several parts.
-    pub multipart: bool,
+    pub several: Option<Several>,
     /// After so many pictures its clock goes on by so many ns.
     pub jump: Option<(u64, u64)>,
     /// Its first picture has this number; 0: 1.
@@ -54,42 +36,22 @@ pub struct Faults {
     pub skips: u64,
 }
 
+/// How a camera sends several components in a payload: each place's number, and a reflectance of its low byte.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Several {
+    /// After the standard: it says that it can, and does so if it is told to.
+    Told,
+    /// It never says so, and always does.
+    Unsaid,
+    /// Of a payload type that nobody reads.
+    Foreign,
+}
+
 impl Faults {
     /// What its clock says after so many pictures.
     fn clock(&self, begun: Instant, taken: u64) -> u64 {
         let jumped = self.jump.filter(|(after, _)| taken > *after).map_or(0, |(_, by)| by);
         begun.elapsed().as_nanos() as u64 + jumped
-    }
-}
-
-struct Registers {
-    memory: Vec<u8>,
-    xml: Vec<u8>,
-}
-
-impl Registers {
-    fn put(&mut self, at: u32, value: u32) {
-        let at = at as usize;
-        self.memory[at..at + 4].copy_from_slice(&value.to_be_bytes());
-    }
-    fn get(&self, at: u32) -> u32 {
-        let at = at as usize;
-        self.memory.get(at..at + 4).map_or(0, |b| u32::from_be_bytes(b.try_into().unwrap()))
-    }
-    fn words(&mut self, at: usize, text: &str) {
-        self.memory[at..at + text.len()].copy_from_slice(text.as_bytes());
-    }
-    fn read(&self, at: u32, length: usize) -> Vec<u8> {
-        if at >= XML {
-            let from = (at - XML) as usize;
-            let mut out = self.xml.get(from..).unwrap_or_default().to_vec();
-            out.resize(length, 0);
-            return out;
-        }
-        let mut out =
-            self.memory.get(at as usize..).unwrap_or_default().iter().take(length).copied().collect::<Vec<_>>();
-        out.resize(length, 0);
-        out
     }
 }
 
@@ -115,10 +77,17 @@ impl Device {
         }
         if let Some([a, c]) = faults.heights {
             let mut r = registers.lock().unwrap();
-            r.xml = xml(true).into_bytes();
+            r.xml = xml(true, faults.several == Some(Several::Told)).into_bytes();
             let url = format!("Local:test.xml;{XML:x};{:x}", r.xml.len());
             r.words(0x200, &url);
             r.put(FORMAT, COORD3D_C16);
+            if faults.several == Some(Several::Told) {
+                r.put(CAN, PARTS);
+            }
+            // The selected component is the one without heights.
+            [(COMPONENT, 0), (FORMATS, MONO8), (FORMATS + 4, COORD3D_C16), (ENABLED, 1), (ENABLED + 4, 1)]
+                .iter()
+                .for_each(|(at, value)| r.put(*at, *value));
             r.put(MODE, if faults.uncalibrated { 0 } else { 7 });
             for (axis, [scale, offset]) in [(0, a), (2, c)] {
                 r.put(OF_AXES + 16 * axis, scale.to_bits());
@@ -152,144 +121,6 @@ impl Drop for Device {
         self.stop.store(true, Ordering::Relaxed);
         self.threads.drain(..).for_each(|t| drop(t.join()));
     }
-}
-
-fn registers(ip: Ipv4Addr, picture: &Image, deep: bool) -> Registers {
-    let mut r = Registers { memory: vec![0; 0x10100], xml: xml(false).into_bytes() };
-    r.put(0, 0x0001_0002);
-    r.put(4, 0x8000_0001);
-    r.put(0x0c, u32::from(ip));
-    r.put(0x10, 7);
-    r.put(0x14, 5);
-    r.put(0x24, u32::from(ip));
-    r.put(0x34, 0xff00_0000);
-    r.words(0x48, "Sheetlight");
-    r.words(0x68, "Test device");
-    r.words(0x88, "1");
-    r.words(0xd8, &format!("T{}", ip.octets()[3]));
-    let url = format!("Local:test.xml;{XML:x};{:x}", r.xml.len());
-    r.words(0x200, &url);
-    r.put(0x600, 1);
-    r.put(0x904, 1);
-    // Write memory, packet resend.
-    r.put(0x934, 0x0000_0006);
-    r.put(0x938, 3000);
-    r.put(0x940, 1_000_000_000);
-    r.put(PACKET, 1500);
-    r.put(WIDTH, picture.width);
-    r.put(HEIGHT, picture.height);
-    r.put(FORMAT, if deep { MONO12 } else { MONO8 });
-    r.put(PAYLOAD, picture.width * picture.height * if deep { 2 } else { 1 });
-    r.put(EXPOSURE, 1000.0f32.to_bits());
-    r
-}
-
-/// Features of the 3D Scan Control; those of a coordinate lie 16 bytes apart, by the selector.
-fn scan3d() -> String {
-    let word = |name: &str, at: u32, entries: &[(&str, u32)]| {
-        let of = |(n, v): &(&str, u32)| format!("<EnumEntry Name=\"{n}\"><Value>{v}</Value></EnumEntry>");
-        let entries: String = entries.iter().map(of).collect();
-        format!(
-            "<Enumeration Name=\"{name}\">{entries}<pValue>{name}Reg</pValue></Enumeration><IntReg \
-             Name=\"{name}Reg\"><Address>0x{at:x}</Address><Length>4</Length><AccessMode>RW</AccessMode>\
-             <pPort>Device</pPort><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>"
-        )
-    };
-    let float = |name: &str, at: u32| {
-        format!(
-            "<Float Name=\"{name}\"><pValue>{name}Reg</pValue></Float><FloatReg Name=\"{name}Reg\">\
-             <Address>0x{at:x}</Address><pIndex Offset=\"16\">Scan3dCoordinateSelectorReg</pIndex>\
-             <Length>4</Length><AccessMode>RO</AccessMode><pPort>Device</pPort>\
-             <Endianess>BigEndian</Endianess></FloatReg>"
-        )
-    };
-    [
-        word("Scan3dOutputMode", MODE, &[("UncalibratedC", 0), ("RectifiedC", 7)]),
-        word("Scan3dDistanceUnit", 0x10028, &[("Millimeter", 0), ("Inch", 1)]),
-        word("Scan3dCoordinateSelector", SELECTOR, &[("CoordinateA", 0), ("CoordinateB", 1), ("CoordinateC", 2)]),
-        float("Scan3dCoordinateScale", OF_AXES),
-        float("Scan3dCoordinateOffset", OF_AXES + 4),
-        float("Scan3dInvalidDataValue", OF_AXES + 8),
-        "<Boolean Name=\"Scan3dInvalidDataFlag\"><Value>1</Value></Boolean>".into(),
-    ]
-    .concat()
-}
-
-fn xml(heights: bool) -> String {
-    let reg = |name: &str, at: u32, mode: &str| {
-        format!(
-            "<IntReg \
-             Name=\"{name}Reg\"><Address>0x{at:x}</Address><Length>4</Length><AccessMode>{mode}</AccessMode>\
-             <pPort>Device</pPort><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>"
-        )
-    };
-    let integer = |name: &str, at: u32| {
-        format!(
-            "<Integer Name=\"{name}\"><pValue>{name}Reg</pValue><Min>1</Min><Max>100000000</Max></Integer>{}",
-            reg(name, at, "RW")
-        )
-    };
-    let features = [
-        "Width",
-        "Height",
-        "PayloadSize",
-        "PixelFormat",
-        "AcquisitionStart",
-        "AcquisitionStop",
-        "ExposureTime",
-        "GevTimestampTickFrequency",
-        "GevTimestampControlLatch",
-        "GevTimestampValue",
-    ];
-    let listed: String = features.iter().map(|f| format!("<pFeature>{f}</pFeature>")).collect();
-    let command = |name: &str, reg: &str, value: u32| {
-        format!("<Command Name=\"{name}\"><pValue>{reg}</pValue><CommandValue>{value}</CommandValue></Command>")
-    };
-    let body = [
-        format!("<Category Name=\"Root\">{listed}</Category>"),
-        integer("Width", WIDTH),
-        integer("Height", HEIGHT),
-        integer("PayloadSize", PAYLOAD),
-        format!(
-            "<Enumeration Name=\"PixelFormat\"><EnumEntry \
-                 Name=\"Mono8\"><Value>{MONO8}</Value></EnumEntry><EnumEntry \
-                 Name=\"BayerRG8\"><Value>{BAYER}</Value></EnumEntry><EnumEntry \
-                 Name=\"Coord3D_C16\"><Value>{COORD3D_C16}</Value></EnumEntry><EnumEntry \
-                 Name=\"Mono12\"><Value>{MONO12}</Value></EnumEntry><pValue>PixelFormatReg</pValue></Enumeration>"
-        ),
-        reg("PixelFormat", FORMAT, "RW"),
-        reg("Acquisition", START, "RW"),
-        command("AcquisitionStart", "AcquisitionReg", 1),
-        command("AcquisitionStop", "AcquisitionReg", 0),
-        "<Float \
-         Name=\"ExposureTime\"><pValue>ExposureTimeReg</pValue><Min>10</Min><Max>1000000</Max><Unit>us</Unit>\
-         </Float>"
-            .into(),
-        format!(
-            "<FloatReg \
-                 Name=\"ExposureTimeReg\"><Address>0x{EXPOSURE:x}</Address><Length>4</Length>\
-                 <AccessMode>RW</AccessMode><pPort>Device</pPort><Endianess>BigEndian</Endianess></FloatReg>"
-        ),
-        integer("GevTimestampTickFrequency", 0x940),
-        reg("Latch", LATCH, "WO"),
-        command("GevTimestampControlLatch", "LatchReg", 2),
-        "<Integer Name=\"GevTimestampValue\"><pValue>GevTimestampValueReg</pValue></Integer>".into(),
-        "<IntReg \
-         Name=\"GevTimestampValueReg\"><Address>0x948</Address><Length>8</Length><AccessMode>RO</AccessMode>\
-         <pPort>Device</pPort><Cachable>NoCache</Cachable><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess>\
-         </IntReg>"
-            .into(),
-        if heights { scan3d() } else { String::new() },
-        "<Port Name=\"Device\"></Port>".into(),
-    ];
-    format!(
-        "<?xml version=\"1.0\" encoding=\"utf-8\"?><RegisterDescription ModelName=\"Test\" VendorName=\"Sheetlight\" \
-         StandardNameSpace=\"GEV\" SchemaMajorVersion=\"1\" SchemaMinorVersion=\"1\" SchemaSubMinorVersion=\"0\" \
-         MajorVersion=\"1\" MinorVersion=\"0\" SubMinorVersion=\"0\" ToolTip=\"\" \
-         ProductGuid=\"11111111-1111-1111-1111-111111111111\" VersionGuid=\"11111111-1111-1111-1111-111111111112\" \
-         xmlns=\"http://www.genicam.org/GenApi/Version_1_1\">{}</RegisterDescription>",
-        body.concat()
-    )
 }
 
 type Sent = Mutex<VecDeque<(u64, Vec<Vec<u8>>)>>;
@@ -350,7 +181,12 @@ fn answer(
             }
             0x0040 if faults.resends => {
                 let to = SocketAddr::from((Ipv4Addr::from(r.get(ADDRESS)), r.get(PORT) as u16));
-                let (block, first, last) = (u64::from(half(10)), word(12) & 0xff_ffff, word(16) & 0xff_ffff);
+                let long = buffer[1] & 0x10 != 0;
+                let (block, mask) = match long {
+                    true => (u64::from(word(20)) << 32 | u64::from(word(24)), u32::MAX),
+                    false => (u64::from(half(10)), 0xff_ffff),
+                };
+                let (first, last) = (word(12) & mask, word(16) & mask);
                 if let Some((_, packets)) = sent.lock().unwrap().iter().find(|(b, _)| *b == block) {
                     let wanted = packets.iter().skip(first as usize).take((last - first + 1) as usize);
                     wanted.for_each(|p| drop(data.send_to(p, to)));
@@ -368,33 +204,86 @@ fn answer(
     }
 }
 
-fn packets(picture: &Image, block: u64, ns: u64, size: usize, faults: Faults) -> Vec<Vec<u8>> {
+/// One part of a payload: its data type (1: an image, 5: one with depths), pixel format, bytes.
+type Part = (u16, u32, Vec<u8>);
+
+/// The parts that a camera with these faults sends of a picture.
+fn parts(picture: &Image, registers: [u32; 3], faults: Faults) -> Vec<Part> {
     let (bytes, code): (Vec<u8>, u32) = match &picture.pixels {
         Pixels::U8(p) => (p.clone(), MONO8),
         Pixels::U16(p) => (p.iter().flat_map(|l| l.to_le_bytes()).collect(), MONO12),
     };
-    let code = if faults.heights.is_some() { COORD3D_C16 } else { code };
-    let (payload, data) = if faults.multipart { (10, 7) } else { (1, 3) };
+    let main = (5, if faults.heights.is_some() { COORD3D_C16 } else { code }, bytes);
+    let light = (1, MONO8, main.2.iter().copied().step_by(2).collect());
+    let [does, light_enabled, heights_enabled] = registers;
+    match faults.several {
+        Some(Several::Told) => {
+            let enabled = [light_enabled, heights_enabled].into_iter().zip([light, main]);
+            let sent = enabled.filter(|(on, _)| *on == 1).map(|(_, part)| part);
+            // Who does not understand several parts gets the first.
+            sent.take(if does & PARTS == 0 { 1 } else { 2 }).collect()
+        }
+        Some(_) => vec![light, main],
+        None => vec![main],
+    }
+}
+
+fn packets(size: [u32; 2], sent: &[Part], block: u64, ns: u64, packet: usize, faults: Faults) -> Vec<Vec<u8>> {
+    let [width, height] = size;
+    let several = faults.several.is_some() && sent.len() > 1;
+    // Types of payload: image, several parts, GenDC. Formats of packets: data, data of parts, data of GenDC.
+    let (payload, data) = match faults.several {
+        Some(Several::Foreign) => (11, 8),
+        _ if several => (10, 7),
+        _ => (1, 3),
+    };
+    // Several parts come with numbers of 64 and 32 bits; where the short number was, the leader has how many there are.
     let head = |kind: u8, number: u32| {
         let mut out = vec![0, 0];
-        out.extend((block as u16).to_be_bytes());
-        out.push(kind);
-        out.extend(&number.to_be_bytes()[1..]);
+        if several {
+            out.extend([0, 0, 0x80 | kind, 0, 0, if kind == 1 { sent.len() as u8 } else { 0 }]);
+            out.extend(block.to_be_bytes());
+            out.extend(number.to_be_bytes());
+        } else {
+            out.extend((block as u16).to_be_bytes());
+            out.push(kind);
+            out.extend(&number.to_be_bytes()[1..]);
+        }
         out
     };
     let mut leader = head(1, 0);
     leader.extend([0, 0, 0, payload]);
     leader.extend(ns.to_be_bytes());
-    [code, picture.width, picture.height, 0, 0, 0].iter().for_each(|w| leader.extend(w.to_be_bytes()));
-    let mut all = vec![leader];
-    for chunk in bytes.chunks(size - 36) {
-        let mut packet = head(data, all.len() as u32);
-        packet.extend(chunk);
-        all.push(packet);
+    if several {
+        for (i, (kind, code, bytes)) in sent.iter().enumerate() {
+            leader.extend(kind.to_be_bytes());
+            leader.extend(&(bytes.len() as u64).to_be_bytes()[2..]);
+            leader.extend(code.to_be_bytes());
+            // One zone, from top to bottom; purpose and region.
+            leader.extend([0, 0, 0, 0, 0, 0, 0, 0, 0, i as u8, 0, 0]);
+            [width, height, 0, 0, 0, 0].iter().for_each(|w| leader.extend(w.to_be_bytes()));
+        }
+    } else {
+        [sent[0].1, width, height, 0, 0, 0].iter().for_each(|w| leader.extend(w.to_be_bytes()));
+    }
+    // Places count from the beginning of the payload.
+    let (mut all, mut before) = (vec![leader], 0);
+    for (part, (_, _, bytes)) in sent.iter().enumerate() {
+        let room = packet - if several { 56 } else { 36 };
+        for (i, chunk) in bytes.chunks(room).enumerate() {
+            let mut packet = head(data, all.len() as u32);
+            if several {
+                packet.extend([part as u8, 0]);
+                packet.extend(&((before + i * room) as u64).to_be_bytes()[2..]);
+            }
+            packet.extend(chunk);
+            all.push(packet);
+        }
+        before += bytes.len();
     }
     let mut trailer = head(2, all.len() as u32);
     trailer.extend([0, 0, 0, payload]);
-    trailer.extend(picture.height.to_be_bytes());
+    trailer.extend(height.to_be_bytes());
     all.push(trailer);
     all
 }
@@ -417,10 +306,15 @@ fn stream(
     let mut dice = 12345u64;
     let mut next: Option<Instant> = None;
     while !stop.load(Ordering::Relaxed) {
-        let (running, to, size) = {
+        let (running, to, packet, told) = {
             let r = registers.lock().unwrap();
             let to = SocketAddr::from((Ipv4Addr::from(r.get(ADDRESS)), r.get(PORT) as u16));
-            (r.get(START) == 1 && r.get(CCP) != 0 && to.port() != 0, to, (r.get(PACKET) & 0xffff) as usize)
+            (
+                r.get(START) == 1 && r.get(CCP) != 0 && to.port() != 0,
+                to,
+                (r.get(PACKET) & 0xffff) as usize,
+                [DOES, ENABLED, ENABLED + 4].map(|at| r.get(at)),
+            )
         };
         let done = taken.load(Ordering::Relaxed);
         if !running || done >= count {
@@ -440,7 +334,9 @@ fn stream(
         // Numbers of 16 bits without 0.
         let block = (done + faults.first.saturating_sub(1)) % 65_535 + 1;
         let ns = faults.clock(begun, done);
-        let all = packets(&pictures[done as usize % pictures.len()], block, ns, size, faults);
+        let picture = &pictures[done as usize % pictures.len()];
+        let size = (picture.width, picture.height);
+        let all = packets(size.into(), &parts(picture, told, faults), block, ns, packet, faults);
         for packet in &all {
             dice = dice.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             if (dice >> 33) % 1000 < faults.lost_per_mille {

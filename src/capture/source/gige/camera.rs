@@ -2,6 +2,8 @@
 //! Frame and unit: the camera's clock in ns.
 
 use super::coordinates::{Coordinates, Told, is_coordinates};
+use super::delivery::{Delivery, Got, sends_parts};
+use super::features::{feature, own_name, restore, settings, several};
 use super::find::find;
 use super::numbers::Numbers;
 use super::pixels::{depth, unpack};
@@ -14,9 +16,8 @@ use crate::fault::{Fault, Result};
 use crate::raster::Image;
 use crate::recording::profiles::measured;
 use std::time::{Duration, Instant};
-use viva_genicam::genapi::FeatureValue;
 use viva_genicam::gige::DeviceInfo;
-use viva_genicam::{Camera, ControlState, FrameStream, GenicamError, GigeRegisterIo, StreamOptions, blocking};
+use viva_genicam::{Camera, ControlState, GenicamError, GigeRegisterIo, StreamOptions, blocking};
 
 /// After this time without data the camera is queried whether it is still there.
 const SILENCE: Duration = Duration::from_secs(1);
@@ -26,38 +27,6 @@ const LATCH: [&str; 3] = ["GevTimestampControlLatch", "TimestampControlLatch", "
 const CLOCK: [&str; 3] = ["GevTimestampValue", "TimestampValue", "TimestampLatchValue"];
 const TICKS: [&str; 2] = ["GevTimestampTickFrequency", "TimestampTickFrequency"];
 const EXPOSURE: [&str; 2] = ["ExposureTime", "ExposureTimeAbs"];
-const FORMER: [(&str, &str); 5] = [
-    ("ExposureTime", "ExposureTimeAbs"),
-    ("Gain", "GainRaw"),
-    ("AcquisitionFrameRate", "AcquisitionFrameRateAbs"),
-    ("TriggerDelay", "TriggerDelayAbs"),
-    ("AcquisitionFrameRateEnable", "AcquisitionFrameRateEnabled"),
-];
-/// Features that are restored, in this order, when a camera comes back with its defaults.
-const SETTINGS: [&str; 22] = [
-    "Scan3dOutputMode",
-    "PixelFormat",
-    "BinningHorizontal",
-    "BinningVertical",
-    "DecimationHorizontal",
-    "DecimationVertical",
-    "ReverseX",
-    "ReverseY",
-    "Width",
-    "Height",
-    "OffsetX",
-    "OffsetY",
-    "ExposureTime",
-    "Gain",
-    "AcquisitionFrameRateEnable",
-    "AcquisitionFrameRate",
-    "TriggerSelector",
-    "TriggerSource",
-    "TriggerActivation",
-    "TriggerDelay",
-    "TriggerMode",
-    "ChunkModeActive",
-];
 const CHUNKS: [&str; 4] = ["ChunkCounterValue", "ChunkEncoderValue", "ChunkLineStatusAll", "ChunkEncoderStatusValue"];
 
 /// A camera on the network.
@@ -67,7 +36,7 @@ pub struct GigeCamera {
     serial: String,
     packet: Option<u32>,
     camera: Camera<GigeRegisterIo>,
-    stream: Option<FrameStream>,
+    stream: Option<Delivery>,
     format: Format,
     readout: Option<Readout>,
     pixel_format: String,
@@ -84,6 +53,8 @@ pub struct GigeCamera {
     heard: Instant,
     /// Whether it was seen to send something that is no picture.
     foreign: bool,
+    /// Whether it sends payloads of several parts.
+    parts: bool,
     numbers: Numbers,
     /// Its settings when it began to send. A camera that lost its power comes back without them.
     kept: Vec<(&'static str, String)>,
@@ -137,6 +108,7 @@ impl GigeCamera {
             resent: 0,
             heard: Instant::now(),
             foreign: false,
+            parts: false,
             numbers: Numbers::default(),
             kept: Vec::new(),
         };
@@ -144,8 +116,23 @@ impl GigeCamera {
         Ok(camera)
     }
 
+    /// With the component chosen that is read: settings mean the chosen one. The user's choice is restored.
+    fn on_component<T>(&mut self, work: impl FnOnce(&mut Self) -> T) -> T {
+        let own = self.camera.get_enum("ComponentSelector").ok();
+        self.parts = several(&mut self.camera) && sends_parts(&self.camera);
+        let out = work(self);
+        if let Some(own) = own {
+            let _ = self.camera.set("ComponentSelector", &own);
+        }
+        out
+    }
+
     /// Reads the format of its pictures.
     fn look(&mut self) -> Result<()> {
+        self.on_component(Self::read_format)
+    }
+
+    fn read_format(&mut self) -> Result<()> {
         let at = format!("gige://{}", self.word);
         let read = |name: &str| self.camera.get_integer(name).map_err(|e| said(&format!("{at}: {name}"), &e));
         let size = |v: i64| u32::try_from(v).ok().filter(|v| (1..=65_535).contains(v));
@@ -177,15 +164,15 @@ impl GigeCamera {
     fn start(&mut self) -> Result<()> {
         let at = format!("gige://{}", self.word);
         if self.kept.is_empty() {
-            self.kept = self.settings();
+            self.kept = self.on_component(|camera| settings(&mut camera.camera));
         }
         let options = StreamOptions::new();
         let options = match self.packet {
             Some(size) => options.packet_size(size),
             None => options.auto_packet_size(),
         };
-        let mut stream = self.camera.open_stream(options).map_err(|e| said(&at, &e))?;
-        stream.set_deliver_incomplete(true);
+        let part = self.parts.then_some(&*self.pixel_format);
+        let stream = Delivery::open(&mut self.camera, options, part).map_err(|e| said(&at, &e))?;
         self.camera.acquisition_start().map_err(|e| said(&at, &e))?;
         self.stream = Some(stream);
         self.numbers = Numbers::default();
@@ -333,12 +320,8 @@ impl PictureSource for GigeCamera {
         let (at, device) = (format!("gige://{}", self.word), find(&self.word)?);
         self.camera = blocking::connect(&device).map_err(|e| said(&at, &e))?;
         let (former, coordinates) = ((self.format, self.readout), self.coordinates.clone());
-        for (name, value) in self.kept.clone() {
-            let is = self.feature(name).and_then(|f| f.value);
-            if is.is_some_and(|v| v.to_string() != value) {
-                self.camera.set(name, &value).map_err(|e| said(&format!("{at}: {name} = {value}"), &e))?;
-            }
-        }
+        self.on_component(|camera| restore(&mut camera.camera, &camera.kept))
+            .map_err(|(name, e)| said(&format!("{at}: {name}"), &e))?;
         self.look()?;
         if self.format != former.0 {
             return Err(
@@ -363,13 +346,13 @@ impl PictureSource for GigeCamera {
         let mut names: Vec<String> = listed.collect();
         names.sort();
         names.dedup();
-        let all: Vec<Feature> = names.iter().filter_map(|name| self.feature(name)).collect();
+        let all: Vec<Feature> = names.iter().filter_map(|name| feature(&mut self.camera, name)).collect();
         Ok(all)
     }
 
     fn set(&mut self, name: &str, value: &str) -> Result<()> {
-        let name = self.own_name(name);
-        let Some(feature) = self.feature(name) else {
+        let name = own_name(&self.camera, name);
+        let Some(feature) = feature(&mut self.camera, name) else {
             return Err(Fault::usage(format!("gige://{}: has no feature {name}", self.word))
                 .cause("a misspelt name, or a camera without it")
                 .next("list its features with: sheetlight camera show"));
@@ -410,7 +393,7 @@ impl PictureSource for GigeCamera {
 impl Told for GigeCamera {
     fn value(&mut self, name: &str) -> Option<Value> {
         self.camera.invalidate(name);
-        self.feature(name)?.value
+        feature(&mut self.camera, name)?.value
     }
 
     fn choose(&mut self, name: &str, entry: &str) -> Result<()> {
@@ -427,26 +410,26 @@ impl GigeCamera {
             return Event::Lost(fault);
         }
         let stream = self.stream.as_mut().expect("started above");
-        let got = stream.next_frame_blocking(within);
-        self.resent = stream.stats().resend_recovered;
+        let got = stream.next(within);
+        self.resent = stream.resent();
         match got {
-            Ok(Some(frame)) => self.taken(frame),
-            Ok(None) => self.gone("the stream ended"),
-            Err(GenicamError::Timeout(_)) => {
+            Got::Frame(frame) => self.taken(frame),
+            Got::Broken(number, why) => {
+                self.heard = Instant::now();
+                match self.numbers.on_from(number) {
+                    Some(id) => Event::Incomplete { id, why },
+                    None => self.gone(&format!("its count began again, at {number}: it was reset")),
+                }
+            }
+            Got::Ended(why) => self.gone(&why),
+            Got::Nothing => {
+                if let Some(n) = self.stream.as_ref().and_then(Delivery::foreign) {
+                    return self.other_payload(n);
+                }
                 if self.heard.elapsed() < SILENCE {
                     return Event::Quiet;
                 }
                 self.heard = Instant::now();
-                let seen = self.stream.as_ref().map(FrameStream::stats).unwrap_or_default();
-                if seen.frames_complete + seen.frames_incomplete == 0 && seen.packets_ignored_unsupported > 0 {
-                    self.foreign = true;
-                    let n = seen.packets_ignored_unsupported;
-                    return Event::Lost(
-                        Fault::input(format!("gige://{}: {n} packets of another payload than a picture", self.word))
-                            .cause("the camera sends multi-part payloads (several components at once) or files")
-                            .next("enable one component and a single-part payload: sheetlight camera show"),
-                    );
-                }
                 // A camera that waits for a trigger sends nothing but answers queries.
                 let there = self.camera.transport().control_state() == ControlState::Held;
                 self.camera.invalidate("Width");
@@ -456,48 +439,16 @@ impl GigeCamera {
                     Err(e) => self.gone(&format!("does not answer: {e}")),
                 }
             }
-            Err(e) => self.gone(&e.to_string()),
         }
     }
 
-    /// Current values of all settings that affect pictures.
-    fn settings(&mut self) -> Vec<(&'static str, String)> {
-        let kept = |name: &&'static str| {
-            let own = self.own_name(name);
-            let feature = self.feature(own)?;
-            Some((own, feature.value.filter(|_| feature.writable)?.to_string()))
-        };
-        SETTINGS.iter().filter_map(kept).collect()
-    }
-
-    /// This camera's name for a standard feature: cameras from before the standard's second version use other names.
-    fn own_name<'a>(&self, name: &'a str) -> &'a str {
-        let has = |n: &&str| self.camera.nodemap().node(n).is_some();
-        let former = FORMER.iter().filter(|(now, _)| *now == name).map(|(_, then)| *then);
-        std::iter::once(name).chain(former).find(has).unwrap_or(name)
-    }
-
-    /// A feature with its present value; none if the user can neither set nor read it.
-    fn feature(&mut self, name: &str) -> Option<Feature> {
-        let state = self.camera.feature_state(name).ok()?;
-        if !state.is_implemented || !state.is_available || state.access.is_none() {
-            return None;
-        }
-        let value = match (state.kind, state.value) {
-            ("Command", _) => Some(Value::Command),
-            (_, FeatureValue::Integer(v)) => Some(Value::Integer(v)),
-            (_, FeatureValue::Float(v)) => Some(Value::Float(v)),
-            (_, FeatureValue::Boolean(v)) => Some(Value::Boolean(v)),
-            (_, FeatureValue::Enum(v) | FeatureValue::String(v)) => Some(Value::Word(v)),
-            _ => return None,
-        };
-        let range = match (state.enum_entries, state.range) {
-            (Some(words), _) => Range::OneOf(words),
-            (None, Some(r)) => Range::Between(r.min, r.max),
-            _ => Range::Any,
-        };
-        let writable = !matches!(state.access, Some(viva_genicam::genapi::AccessMode::RO));
-        Some(Feature { name: name.into(), value, unit: state.unit.unwrap_or_default(), range, writable })
+    fn other_payload(&mut self, packets: u64) -> Event {
+        self.foreign = true;
+        Event::Lost(
+            Fault::input(format!("gige://{}: {packets} packets of another payload than a picture", self.word))
+                .cause("the camera sends GenDC, files, or parts that it does not announce")
+                .next("choose a payload of pictures, or one component: sheetlight camera show"),
+        )
     }
 }
 

@@ -4,8 +4,12 @@
 
 mod camera;
 mod coordinates;
+mod delivery;
+mod features;
 mod find;
 mod numbers;
+mod part_stream;
+mod parts;
 mod pixels;
 mod readout;
 
