@@ -10,11 +10,15 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::broadcast::{Receiver, error::RecvError};
+use tokio::sync::watch;
 
 /// Messages that wait for a broker; what comes while all places are taken is not sent.
 pub(super) const WAITING: usize = 64;
 /// First and longest wait before the next attempt to connect.
 pub(super) const AGAIN: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(30)];
+
+/// Topic of the bar.
+const BAR: &str = "status";
 
 /// Name of this door among the links.
 pub const DOOR: &str = "mqtt";
@@ -29,11 +33,12 @@ pub async fn publish(broker: Broker, hub: Arc<Hub>) {
         link.address = broker.name();
         link.problem = Some(format!("{} was not reached yet", broker.name()));
     });
-    tokio::join!(hold(&broker, &hub, &client, connection), pass_on(&broker, &hub, &client, events));
+    let (told, connected) = watch::channel(false);
+    tokio::join!(hold(&broker, &hub, &told, connection), pass_on(&broker, &hub, &client, events, connected));
 }
 
-/// Holds the connection, and makes it again.
-async fn hold(broker: &Broker, hub: &Hub, client: &AsyncClient, mut connection: EventLoop) {
+/// Holds the connection, makes it again, and tells whether there is one.
+async fn hold(broker: &Broker, hub: &Hub, connected: &watch::Sender<bool>, mut connection: EventLoop) {
     let mut wait = AGAIN[0];
     loop {
         match connection.poll().await {
@@ -43,10 +48,11 @@ async fn hold(broker: &Broker, hub: &Hub, client: &AsyncClient, mut connection: 
                     link.peers = vec![broker.name()];
                 });
                 wait = AGAIN[0];
-                let _ = client.try_publish(broker.topic("state"), QoS::AtLeastOnce, true, "online");
+                connected.send_replace(true);
             }
             Ok(_) => {}
             Err(e) => {
+                connected.send_replace(false);
                 hub.link(DOOR, |link| {
                     link.problem = Some(format!("{} does not answer: {e}", broker.name()));
                     link.peers.clear();
@@ -58,13 +64,32 @@ async fn hold(broker: &Broker, hub: &Hub, client: &AsyncClient, mut connection: 
     }
 }
 
-/// Sends what is of use to others.
-async fn pass_on(broker: &Broker, hub: &Hub, client: &AsyncClient, mut events: Receiver<Arc<str>>) {
+/// Sends what is of use to others. While there is no connection, the places of waiting messages are for jobs and their
+/// results: the bar comes again.
+async fn pass_on(
+    broker: &Broker,
+    hub: &Hub,
+    client: &AsyncClient,
+    mut events: Receiver<Arc<str>>,
+    mut connected: watch::Receiver<bool>,
+) {
     let mut states = States::default();
     loop {
-        match events.recv().await {
+        let event = tokio::select! {
+            event = events.recv() => event,
+            Ok(()) = connected.changed() => {
+                if *connected.borrow_and_update() {
+                    // Waits for a place: after a long outage all are taken.
+                    let _ = client.publish(broker.topic("state"), QoS::AtLeastOnce, true, "online").await;
+                }
+                continue;
+            }
+        };
+        match event {
             Ok(text) => {
-                for message in states.messages(&serde_json::from_str(&text).expect("the hub's own text")) {
+                let bars = *connected.borrow();
+                let messages = states.messages(&serde_json::from_str(&text).expect("the hub's own text"));
+                for message in messages.into_iter().filter(|message| bars || message.topic != BAR) {
                     let (topic, qos) = (broker.topic(&message.topic), QoS::AtLeastOnce);
                     let handed = client.try_publish(topic, qos, message.kept, message.text).is_ok();
                     hub.link(DOOR, |link| if handed { link.sent += 1 } else { link.lost += 1 });
@@ -93,7 +118,7 @@ impl States {
     fn messages(&mut self, event: &Value) -> Vec<Message> {
         let data = &event["data"];
         match event["event"].as_str() {
-            Some("bar") => vec![Message { topic: "status".into(), kept: true, text: data.to_string() }],
+            Some("bar") => vec![Message { topic: BAR.into(), kept: true, text: data.to_string() }],
             Some("job") => self.job(data),
             Some("gone") => {
                 data.as_str().map(|id| self.0.remove(id));
