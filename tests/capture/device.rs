@@ -39,9 +39,9 @@ pub struct Faults {
 /// How a camera sends several components in a payload: each place's number, and a reflectance of its low byte.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Several {
-    /// After the standard: it says that it can, and does so if it is told to.
+    /// After the standard: it announces them, and sends them if the receiver asks for them.
     Told,
-    /// It never says so, and always does.
+    /// It does not announce them, and always sends them.
     Unsaid,
     /// Of a payload type that nobody reads.
     Foreign,

@@ -25,7 +25,7 @@ pub const COORD3D_C16: u32 = 0x0110_00b8;
 pub const COMPONENT: u32 = 0x10080;
 pub const FORMATS: u32 = 0x10084;
 pub const ENABLED: u32 = 0x1008c;
-/// What the stream channel can do and is told to do; the bit of payloads of several parts.
+/// Capabilities and configuration of the stream channel; the bit of multi-part payloads.
 pub const CAN: u32 = 0x0d20;
 pub const DOES: u32 = 0x0d24;
 pub const PARTS: u32 = 0x40;

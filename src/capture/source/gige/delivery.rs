@@ -9,12 +9,12 @@ use viva_genicam::genapi::RegisterIo;
 use viva_genicam::pfnc::PixelFormat;
 use viva_genicam::{Camera, Frame, FrameStream, GenicamError, GigeRegisterIo, StreamOptions};
 
-/// Bootstrap registers of the stream channel: port and address that it sends to, what it can do, what it is told to do.
+/// Bootstrap registers of the stream channel: destination port and address, capabilities, configuration.
 const PORT: u64 = 0x0d00;
 const ADDRESS: u64 = 0x0d18;
 const CAN: u64 = 0x0d20;
 const DOES: u64 = 0x0d24;
-/// The bit of multi-part payloads in the last two.
+/// The bit of multi-part payloads in capabilities and configuration.
 const MULTI_PART: u32 = 1 << 6;
 
 /// Where frames come from.

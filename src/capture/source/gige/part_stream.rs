@@ -21,7 +21,7 @@ pub struct PartStream {
     camera: Ipv4Addr,
     blocks: Blocks,
     buffer: Vec<u8>,
-    /// Number of the last request for lost packets; 0 is none.
+    /// Number of the last request for lost packets; 0 before the first.
     requests: u16,
 }
 
@@ -44,7 +44,7 @@ impl PartStream {
         self.socket.local_addr().map(|at| at.port())
     }
 
-    /// Packets of a payload that is none of parts.
+    /// Number of packets of other payload types.
     pub fn foreign(&self) -> u64 {
         self.blocks.foreign
     }

@@ -162,7 +162,7 @@ pub struct Blocks {
     pub lost: VecDeque<Again>,
     /// Packets that came when they were asked for.
     pub resent: u64,
-    /// Packets of a payload that is none of parts.
+    /// Number of packets of other payload types.
     pub foreign: u64,
 }
 
