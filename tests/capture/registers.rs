@@ -95,7 +95,7 @@ pub fn registers(ip: Ipv4Addr, picture: &Image, deep: bool) -> Registers {
     r
 }
 
-/// A feature of one word; `index`: its values lie so many bytes apart, by a selector.
+/// An enumeration and its register of 4 bytes. `index`: the selector that moves the address, or nothing.
 fn word(name: &str, at: u32, entries: &[(&str, u32)], index: &str) -> String {
     let of = |(n, v): &(&str, u32)| format!("<EnumEntry Name=\"{n}\"><Value>{v}</Value></EnumEntry>");
     let entries: String = entries.iter().map(of).collect();

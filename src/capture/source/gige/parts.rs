@@ -20,6 +20,8 @@ const BEFORE_DATA: usize = 8;
 const OVERDUE: Duration = Duration::from_millis(100);
 /// Blocks that are assembled at once: a camera sends one after the other, and packets arrive late by a few.
 const OPEN: usize = 4;
+/// Blocks whose late packets are known: a packet that was asked for may come twice, after blocks that follow.
+const LATE: usize = 16;
 /// Largest block, bytes: three components of 44 million pixels with 16 bits.
 const LARGEST: u64 = 1 << 28;
 /// Memory that a packet needs besides its data, bytes; the smallest packets of the standard carry 532 bytes.
@@ -155,8 +157,8 @@ pub struct Again {
 #[derive(Default)]
 pub struct Blocks {
     open: VecDeque<Open>,
-    /// Number of the newest block that was closed: packets of it arrive too late.
-    closed: Option<u64>,
+    /// Numbers of the last blocks that were closed: their packets arrive too late.
+    closed: VecDeque<u64>,
     done: VecDeque<Block>,
     /// Packets that were lost and not yet asked for.
     pub lost: VecDeque<Again>,
@@ -177,7 +179,7 @@ impl Blocks {
             self.foreign += 1;
             return;
         }
-        if self.closed == Some(header.block_id) {
+        if self.closed.contains(&header.block_id) {
             return;
         }
         let Some(open) = self.of(header.block_id, now) else { return };
@@ -239,7 +241,8 @@ impl Blocks {
 
     fn close(&mut self, id: u64) {
         if let Some(open) = self.open.iter().position(|o| o.id == id).and_then(|i| self.open.remove(i)) {
-            self.closed = Some(id);
+            self.closed.truncate(LATE - 1);
+            self.closed.push_front(id);
             self.done.push_back(open.close());
         }
     }
@@ -368,6 +371,9 @@ mod tests {
         assert_eq!(blocks.lost.pop_front().unwrap().packets, [1, 5]);
         packets[1..6].iter().for_each(|p| blocks.take(p, now));
         assert_eq!((all_of(&mut blocks, now), blocks.resent), (vec![whole(7)], 5));
+        // The same packet again, after the next block: the first one stays closed.
+        block(8, false).iter().chain(&packets[1..2]).for_each(|p| blocks.take(p, now));
+        assert_eq!((all_of(&mut blocks, later), blocks.open.len()), (vec![whole(8)], 0));
         // A fifth block ends the wait for the first.
         let mut blocks = Blocks::default();
         (1..=5).for_each(|id| blocks.take(&block(id, false)[0], now));
